@@ -1,0 +1,2 @@
+//! The `radiosity` program.
+fn main() {}

@@ -1,0 +1,89 @@
+//! What is wrong with an input: every fault at once, each with its place, what it is and what to do.
+
+use serde::Serialize;
+use std::fmt;
+
+/// How bad a fault is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth knowing; nothing was changed.
+    Note,
+    /// The scene loads, but a part was dropped or altered.
+    Warning,
+    /// The scene cannot be used.
+    Error,
+}
+
+/// One fault of an input.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Fault {
+    /// How bad it is.
+    pub severity: Severity,
+    /// Where: file and the place in it, e.g. `room.gltf: accessors[3]` or `room.obj:17`.
+    pub place: String,
+    /// What is wrong, with the value.
+    pub what: String,
+    /// What to do about it; empty where nothing helps.
+    pub hint: String,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let severity = match self.severity {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        };
+        write!(f, "{severity}: {}: {}", self.place, self.what)?;
+        if !self.hint.is_empty() {
+            write!(f, " ({})", self.hint)?;
+        }
+        Ok(())
+    }
+}
+
+/// All faults of an input, in the order they were met.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Faults(pub Vec<Fault>);
+
+impl Faults {
+    /// Adds an error.
+    pub fn error(&mut self, place: impl Into<String>, what: impl Into<String>, hint: impl Into<String>) {
+        self.push(Severity::Error, place.into(), what.into(), hint.into());
+    }
+
+    /// Adds a warning.
+    pub fn warning(&mut self, place: impl Into<String>, what: impl Into<String>, hint: impl Into<String>) {
+        self.push(Severity::Warning, place.into(), what.into(), hint.into());
+    }
+
+    /// Adds a note.
+    pub fn note(&mut self, place: impl Into<String>, what: impl Into<String>, hint: impl Into<String>) {
+        self.push(Severity::Note, place.into(), what.into(), hint.into());
+    }
+
+    fn push(&mut self, severity: Severity, place: String, what: String, hint: String) {
+        self.0.push(Fault { severity, place, what, hint });
+    }
+
+    /// Whether any fault is an error.
+    pub fn has_errors(&self) -> bool {
+        self.0.iter().any(|fault| fault.severity == Severity::Error)
+    }
+}
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, fault) in self.0.iter().enumerate() {
+            if i > 0 {
+                writeln!(f)?;
+            }
+            write!(f, "{fault}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Faults {}

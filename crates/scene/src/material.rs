@@ -1,0 +1,89 @@
+//! How a surface answers light, as its author wrote it down.
+
+use crate::{Bands, Wrap};
+use glam::{DAffine2, DVec2};
+
+/// Largest reflectance the solver accepts. At 1 a closed scene has no bounded solution; 0.99 keeps the guaranteed
+/// bound ‖r‖/(1−ρ) below 100 residuals while no real paint (0.95) or snow (0.98) is darkened.
+pub const MAX_REFLECTANCE: f32 = 0.99;
+
+/// A texture as a material uses it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`crate::Scene::textures`].
+    pub texture: usize,
+    /// Which set of texture coordinates: 0 or 1.
+    pub uv_set: usize,
+    /// Texture coordinates from mesh coordinates (KHR_texture_transform).
+    pub transform: DAffine2,
+    /// Behaviour outside 0..1 along u and v.
+    pub wrap: [Wrap; 2],
+}
+
+impl TextureRef {
+    /// Texture coordinates for mesh coordinates `uv`.
+    pub fn coordinates(&self, uv: DVec2) -> DVec2 {
+        self.transform.transform_point2(uv)
+    }
+}
+
+/// What alpha means (glTF `alphaMode`).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// The surface is absent where alpha is below the cutoff.
+    Mask {
+        /// Alpha below which the surface is cut out.
+        cutoff: f32,
+    },
+    /// The surface covers the share `alpha` of the light and lets the rest pass unchanged.
+    Blend,
+}
+
+/// A diffuse material: reflectance and emission per band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name given by the author; may be empty.
+    pub name: String,
+    /// Linear base colour and alpha.
+    pub base_color: [f32; 4],
+    /// Base colour picture (sRGB, alpha linear), multiplies `base_color`.
+    pub base_color_texture: Option<TextureRef>,
+    /// Metallic share 0..1: that part of the base colour reflects like a mirror and is taken out of the diffuse.
+    pub metallic: f32,
+    /// Picture whose blue channel multiplies `metallic`.
+    pub metallic_texture: Option<TextureRef>,
+    /// Emitted luminance, cd/m² per band (emissive factor × strength).
+    pub emissive: Bands,
+    /// Picture (sRGB) that multiplies `emissive`.
+    pub emissive_texture: Option<TextureRef>,
+    /// Meaning of alpha.
+    pub alpha_mode: AlphaMode,
+    /// Whether the back of the surface reflects and emits as the front does.
+    pub double_sided: bool,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Material {
+            name: String::new(),
+            base_color: [1.0; 4],
+            base_color_texture: None,
+            metallic: 0.0,
+            metallic_texture: None,
+            emissive: [0.0; 3],
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+        }
+    }
+}
+
+impl Material {
+    /// Whether the surface gives light anywhere.
+    pub fn emits(&self) -> bool {
+        self.emissive.iter().any(|&e| e > 0.0)
+    }
+}

@@ -1,0 +1,82 @@
+//! Pictures on surfaces: 8-bit texels as files carry them, decoded when looked up.
+
+use glam::DVec2;
+use std::sync::LazyLock;
+
+/// What happens outside 0..1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Wrap {
+    /// The picture repeats (glTF's default).
+    #[default]
+    Repeat,
+    /// The picture repeats, every other time mirrored.
+    Mirror,
+    /// The border texel goes on.
+    Clamp,
+}
+
+impl Wrap {
+    fn index(self, i: i64, size: i64) -> usize {
+        let i = match self {
+            Wrap::Repeat => i.rem_euclid(size),
+            Wrap::Clamp => i.clamp(0, size - 1),
+            Wrap::Mirror => {
+                let j = i.rem_euclid(2 * size);
+                if j < size { j } else { 2 * size - 1 - j }
+            }
+        };
+        i as usize
+    }
+}
+
+/// A picture of RGBA texels, 8 bits each, row-major from the top (glTF: v = 0 is the top row).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Texture {
+    /// Name or address, for messages.
+    pub name: String,
+    /// Width in texels, at least 1.
+    pub width: u32,
+    /// Height in texels, at least 1.
+    pub height: u32,
+    /// `width * height` texels.
+    pub texels: Vec<[u8; 4]>,
+}
+
+/// Linear value of each sRGB byte (IEC 61966-2-1).
+static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let s = i as f64 / 255.0;
+        (if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }) as f32
+    })
+});
+
+impl Texture {
+    /// Bilinear look-up at `uv`. Colour is decoded from sRGB when `srgb`; alpha never is. All in 0..1.
+    pub fn sample(&self, uv: DVec2, wrap: [Wrap; 2], srgb: bool) -> [f32; 4] {
+        let (w, h) = (i64::from(self.width), i64::from(self.height));
+        let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
+        let (x, y) = (finite(uv.x) * w as f64 - 0.5, finite(uv.y) * h as f64 - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
+        let mut sum = [0.0; 4];
+        for (dx, dy, weight) in [
+            (0, 0, (1.0 - fx) * (1.0 - fy)),
+            (1, 0, fx * (1.0 - fy)),
+            (0, 1, (1.0 - fx) * fy),
+            (1, 1, fx * fy),
+        ] {
+            let column = wrap[0].index((x0 as i64).saturating_add(dx), w);
+            let row = wrap[1].index((y0 as i64).saturating_add(dy), h);
+            let texel = self.texels[row * self.width as usize + column];
+            for (channel, value) in sum.iter_mut().enumerate() {
+                let decoded = if srgb && channel < 3 {
+                    LINEAR_FROM_SRGB[usize::from(texel[channel])]
+                } else {
+                    f32::from(texel[channel]) / 255.0
+                };
+                *value += weight * decoded;
+            }
+        }
+        sum
+    }
+}
