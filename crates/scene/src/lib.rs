@@ -1,7 +1,7 @@
 //! What the user means: surfaces, materials, light sources, cameras, sky — and the elements that carry the unknowns.
 //!
 //! A [`Scene`] is plain data in metres and SI photometric units, flattened into world space and validated by the
-//! reader that made it. [`mesh`] welds it into surfaces that light can be continuous on; [`elements`] cuts those
+//! reader that made it. [`Mesh`] welds it into surfaces that light can be continuous on; [`Elements`] cuts those
 //! into the pieces whose radiosity is one number per band. Nothing in this crate traces a ray or stores a result.
 
 pub mod camera;
@@ -15,9 +15,11 @@ pub mod sky;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
+pub use elements::{ElementId, Elements};
 pub use fault::{Fault, Faults, Severity};
 pub use light::{PointLight, PointLightKind};
 pub use material::{AlphaMode, Material, TextureRef};
+pub use mesh::{Mesh, Side};
 pub use scene::{Object, Scene, Source, Surface, Up};
 pub use sky::Sky;
 pub use texture::{Texture, Wrap};

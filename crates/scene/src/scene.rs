@@ -191,7 +191,11 @@ impl Scene {
         match material.alpha_mode {
             AlphaMode::Opaque => 1.0,
             AlphaMode::Mask { cutoff } => {
-                if self.base_color(material, at)[3] < cutoff { 0.0 } else { 1.0 }
+                if self.base_color(material, at)[3] < cutoff {
+                    0.0
+                } else {
+                    1.0
+                }
             }
             AlphaMode::Blend => self.base_color(material, at)[3].clamp(0.0, 1.0),
         }

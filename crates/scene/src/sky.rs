@@ -88,8 +88,7 @@ mod tests {
             for j in 0..4 * steps {
                 let gamma = (i as f64 + 0.5) / steps as f64 * std::f64::consts::FRAC_PI_2;
                 let azimuth = (j as f64 + 0.5) / (4 * steps) as f64 * std::f64::consts::TAU;
-                let direction =
-                    DVec3::new(gamma.cos() * azimuth.cos(), gamma.sin(), gamma.cos() * azimuth.sin());
+                let direction = DVec3::new(gamma.cos() * azimuth.cos(), gamma.sin(), gamma.cos() * azimuth.sin());
                 let solid_angle = gamma.cos()
                     * (std::f64::consts::FRAC_PI_2 / steps as f64)
                     * (std::f64::consts::TAU / (4 * steps) as f64);
