@@ -1,2 +1,53 @@
-//! Workspace tasks.
-fn main() {}
+//! Workspace tasks, run as `cargo xtask VERB`.
+
+mod fault;
+mod glb;
+mod hash;
+mod scenes;
+mod showcase;
+
+use fault::Fault;
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+Usage: cargo xtask VERB
+
+  showcase [-o FILE]                      write the furnished living room (default out/showcase.glb)
+  scenes building [--rooms N] -o FILE     write a closed building of N rooms joined by doors (default 16)
+  scenes soup [--triangles N] -o FILE     write a closed room filled with small boxes (default 10000)
+  help                                    show this text
+
+Lengths are metres, light is in lux and cd/m². Output is GLB, the same bytes every time.
+";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = match arguments.split_first() {
+        Some((&"showcase", rest)) => showcase::command(rest),
+        Some((&"scenes", rest)) => scenes::command(rest),
+        Some((&("help" | "-h" | "--help"), _)) => Ok(USAGE.to_owned()),
+        Some((verb, _)) => Err(Fault::Usage(format!("there is no verb '{verb}'"))),
+        None => Err(Fault::Usage("a verb is needed".to_owned())),
+    };
+    report(outcome)
+}
+
+/// The only place that prints: what was done, or what went wrong and how to call it right.
+#[expect(clippy::print_stdout, clippy::print_stderr, reason = "a command line tool speaks to its user")]
+fn report(outcome: Result<String, Fault>) -> ExitCode {
+    match outcome {
+        Ok(done) => {
+            println!("{}", done.trim_end());
+            ExitCode::SUCCESS
+        }
+        Err(fault @ Fault::Usage(_)) => {
+            eprint!("xtask: {fault}\n\n{USAGE}");
+            ExitCode::from(2)
+        }
+        Err(fault) => {
+            eprintln!("xtask: {fault}");
+            ExitCode::FAILURE
+        }
+    }
+}

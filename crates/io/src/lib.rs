@@ -1,1 +1,34 @@
-//! Placeholder head; see ARCHITECTURE.md.
+//! Everything that comes in: glTF, OBJ, sky pictures, lists of points.
+//!
+//! Input is somebody else's data. Whatever the bytes, reading ends, takes no more memory than the bytes justify,
+//! opens nothing outside the folder of the file, and answers with a scene of finite numbers or with every fault found.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), radiosity_io::LoadError> {
+//! let loaded = radiosity_io::load("room.glb".as_ref(), &radiosity_io::LoadOptions::default())?;
+//! for fault in &loaded.faults.0 {
+//!     eprintln!("{fault}");
+//! }
+//! # Ok(()) }
+//! ```
+
+mod assemble;
+mod data_uri;
+mod error;
+pub mod gltf;
+pub mod gltf_out;
+mod load;
+pub mod obj;
+mod options;
+mod picture;
+mod points;
+mod sky;
+pub mod source;
+
+pub use error::LoadError;
+pub use gltf::{Document, EncodedImage};
+pub use load::{Loaded, load};
+pub use options::LoadOptions;
+pub use points::{Point, parse_points_csv, read_points_csv};
+pub use sky::{load_sky_hdr, parse_sky};
+pub use source::{Folder, Memory, Source, SourceError};

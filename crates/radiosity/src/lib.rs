@@ -1,1 +1,42 @@
-//! Placeholder head; see ARCHITECTURE.md.
+//! Diffuse global illumination by the radiosity method: a scene goes in, light on its surfaces comes out, with an
+//! error that can be signed.
+//!
+//! ```
+//! use radiosity::{Mesh, Solution, SolveOptions, Tracer, cornell_box};
+//!
+//! let scene = cornell_box();
+//! let mesh = Mesh::new(&scene);
+//! let tracer = Tracer::new(&scene, &mesh);
+//! let options = SolveOptions { element_size: Some(0.1), rays: 32, ..SolveOptions::default() };
+//! let solution = Solution::new(&tracer, &options, &()).unwrap();
+//! let brightest = solution.irradiance().iter().map(|e| e[1]).fold(0.0, f32::max);
+//! assert!(brightest > 0.0);
+//! ```
+
+pub mod answer;
+mod cornell;
+mod error;
+pub mod measure;
+mod monitor;
+pub mod render;
+mod solution;
+pub mod stations;
+
+pub use answer::{Answer, Indirect};
+pub use cornell::cornell_box;
+pub use error::Error;
+pub use measure::{MeasureOptions, Measurement, measure};
+pub use monitor::{Monitor, Stages};
+pub use render::{RenderOptions, place_camera, render};
+pub use solution::{Balance, Solution, SolveOptions};
+
+pub use radiosity_io as io;
+pub use radiosity_scene::{
+    AlphaMode, Bands, Camera, Elements, Fault, Faults, Material, Mesh, Object, PointLight, PointLightKind, Projection,
+    Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef, Up, Wrap, luminance,
+};
+pub use radiosity_solve as solve;
+pub use radiosity_trace::{Found, Place, Tracer};
+pub use radiosity_transport as transport;
+pub use radiosity_view as view;
+pub use radiosity_view::{Audit, Auditor, Field, Picture, Referee};

@@ -21,7 +21,7 @@ pub use light::{PointLight, PointLightKind};
 pub use material::{AlphaMode, Material, TextureRef};
 pub use mesh::{Mesh, Side};
 pub use scene::{Object, Scene, Source, Surface, Up};
-pub use sky::Sky;
+pub use sky::{Sky, SkyPatches};
 pub use texture::{Texture, Wrap};
 
 /// One value per colour band (linear Rec.709 red, green, blue), the way every spectral quantity is carried.

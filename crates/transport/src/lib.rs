@@ -1,1 +1,37 @@
-//! Placeholder head; see ARCHITECTURE.md.
+//! F in its forms: who gives how much light to whom.
+//!
+//! The default form is a table of hit ids ([`HitTable`]): receiver i sends M cosine-distributed rays and keeps the id
+//! of what each one met; every entry weighs 1/M, so a row sums to exactly one. Small and bright sources do not go
+//! through rows: [`Luminaires`] gives their light as a direct column each. Receivers are elements while the equation
+//! is solved and points when an answer is read; both go through the same code ([`Receivers`]).
+
+pub mod exposure;
+pub mod gather;
+pub mod luminaires;
+pub mod polygon;
+pub mod receivers;
+pub mod rows;
+
+pub use exposure::Exposure;
+pub use gather::Gather;
+pub use luminaires::{Light, Luminaires, Shadowing};
+pub use receivers::{ElementReceivers, PointReceivers, Receivers};
+pub use rows::{HitTable, IdSpace};
+
+/// Tells a long computation's progress and may end it.
+pub trait Progress: Sync {
+    /// `done` of `total` units of the current stage are finished; answers whether to go on.
+    fn step(&self, done: usize, total: usize) -> bool;
+}
+
+/// No report, no interruption.
+impl Progress for () {
+    fn step(&self, _done: usize, _total: usize) -> bool {
+        true
+    }
+}
+
+/// A computation was stopped by its [`Progress`].
+#[derive(Clone, Copy, Debug, thiserror::Error, PartialEq, Eq)]
+#[error("stopped on request")]
+pub struct Stopped;

@@ -1,1 +1,15 @@
-//! Placeholder head; see ARCHITECTURE.md.
+//! From unknowns to what people ask for: continuous fields, pictures, lightmaps, and how far to trust them.
+//!
+//! Everything here works on plain arrays by element and band and on rays; nothing knows which transport or which
+//! solver made the numbers.
+
+pub mod audit;
+pub mod lightmap;
+pub mod picture;
+pub mod reconstruct;
+pub mod referee;
+
+pub use audit::{Audit, Auditor};
+pub use picture::{Picture, ViewRays};
+pub use reconstruct::Field;
+pub use referee::Referee;

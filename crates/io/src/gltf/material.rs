@@ -1,0 +1,279 @@
+//! glTF materials as diffuse ones.
+//!
+//! Metal is kept as its share (the scene takes it out of the diffuse reflectance). Emission is cd/m²: factor × picture ×
+//! KHR_materials_emissive_strength. An unlit surface (KHR_materials_unlit) shows its base colour under any light; in a
+//! light simulation it reflects that colour diffusely and gives no light. KHR_materials_pbrSpecularGlossiness
+//! reflects its diffuse colour. A primitive without material is matte grey (0.5) rather than the glTF default, a
+//! white mirror, which no author means by leaving the material out.
+
+use super::Document;
+use super::json::{list, number, numbers, shown, text, whole};
+use crate::picture;
+use glam::{DAffine2, DMat2, DVec2};
+use radiosity_scene::{AlphaMode, Faults, Material, Texture, TextureRef, Wrap};
+use serde_json::Value;
+
+/// Reflectance of a surface whose author named no material.
+pub(crate) const UNNAMED_REFLECTANCE: f32 = 0.5;
+
+/// Materials by glTF index, then one for primitives without material.
+pub(crate) struct Materials {
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+}
+
+pub(crate) fn read(document: &Document, file: &str, faults: &mut Faults) -> Materials {
+    let mut pictures = Pictures {
+        document,
+        file,
+        decoded: vec![None; document.images.len()],
+        textures: Vec::new(),
+        budget: picture::MAX_TEXELS,
+    };
+    let all = list(&document.json, "materials");
+    let mut materials: Vec<Material> =
+        all.iter().enumerate().map(|(index, json)| material(json, index, &mut pictures, faults)).collect();
+    let grey = [UNNAMED_REFLECTANCE, UNNAMED_REFLECTANCE, UNNAMED_REFLECTANCE, 1.0];
+    materials.push(Material { name: "no material".to_owned(), base_color: grey, ..Material::default() });
+    Materials { materials, textures: pictures.textures }
+}
+
+fn material(json: &Value, index: usize, pictures: &mut Pictures<'_>, faults: &mut Faults) -> Material {
+    let name = text(json, "name");
+    let place = format!("{}: materials[{index}] '{name}'", pictures.file);
+    let null = Value::Null;
+    let extension = |name: &str| json.get("extensions").and_then(|all| all.get(name));
+    let mut out = Material {
+        name: if name.is_empty() { format!("material {index}") } else { name.to_owned() },
+        double_sided: json.get("doubleSided").and_then(Value::as_bool).unwrap_or(false),
+        ..Material::default()
+    };
+
+    // Colour and metal.
+    if let Some(old) = extension("KHR_materials_pbrSpecularGlossiness") {
+        out.base_color = factor(old, "diffuseFactor", [1.0; 4], &place, faults);
+        out.base_color_texture = pictures.used(old.get("diffuseTexture"), &place, faults);
+    } else {
+        let pbr = json.get("pbrMetallicRoughness").unwrap_or(&null);
+        out.base_color = factor(pbr, "baseColorFactor", [1.0; 4], &place, faults);
+        out.base_color_texture = pictures.used(pbr.get("baseColorTexture"), &place, faults);
+        [out.metallic] = factor(&wrapped(pbr, "metallicFactor"), "metallicFactor", [1.0], &place, faults);
+        if out.metallic > 0.0 {
+            out.metallic_texture = pictures.used(pbr.get("metallicRoughnessTexture"), &place, faults);
+        }
+    }
+
+    // Emission.
+    let emissive: [f32; 3] = factor(json, "emissiveFactor", [0.0; 3], &place, faults);
+    let strength = match extension("KHR_materials_emissive_strength").and_then(|e| e.get("emissiveStrength")) {
+        None => 1.0,
+        Some(value) => number(value).filter(|s| *s >= 0.0).unwrap_or_else(|| {
+            let what = format!("emissiveStrength is {}, not a number of at least 0; 1 is used", shown(Some(value)));
+            faults.warning(&place, what, "correct it");
+            1.0
+        }),
+    };
+    // Beyond 1e12 (a thousand suns) single precision would not hold squares and sums of it.
+    if strength * f64::from(emissive.iter().fold(0.0_f32, |m, &e| m.max(e))) > 1e12 {
+        faults.error(&place, format!("emits more than 1e12 cd/m²: emissiveStrength {strength:e}"), "correct it");
+    } else {
+        out.emissive = emissive.map(|e| (f64::from(e) * strength) as f32);
+    }
+    if out.emits() {
+        out.emissive_texture = pictures.used(json.get("emissiveTexture"), &place, faults);
+    }
+
+    // Alpha.
+    out.alpha_mode = match text(json, "alphaMode") {
+        "MASK" => {
+            let cutoff = json.get("alphaCutoff").map_or(Some(0.5), number);
+            AlphaMode::Mask { cutoff: cutoff.unwrap_or(0.5) as f32 }
+        }
+        "BLEND" => AlphaMode::Blend,
+        "" | "OPAQUE" => AlphaMode::Opaque,
+        other => {
+            faults.warning(&place, format!("alphaMode '{other}'; taken as OPAQUE"), "use OPAQUE, MASK or BLEND");
+            AlphaMode::Opaque
+        }
+    };
+
+    if extension("KHR_materials_unlit").is_some() {
+        (out.metallic, out.metallic_texture) = (0.0, None);
+        (out.emissive, out.emissive_texture) = ([0.0; 3], None);
+        faults.note(&place, "is unlit; its base colour reflects diffusely and it gives no light", "");
+    }
+    for name in ["KHR_materials_transmission", "KHR_materials_diffuse_transmission"] {
+        if extension(name).is_some() {
+            faults.note(&place, format!("{name} is not computed; the surface is opaque"), "use alphaMode BLEND");
+        }
+    }
+    out
+}
+
+/// A lone number as a list of one, so that [`factor`] reads it like the others.
+fn wrapped(json: &Value, name: &str) -> Value {
+    match json.get(name) {
+        Some(value) => serde_json::json!({ name: [value] }),
+        None => Value::Null,
+    }
+}
+
+/// `N` factors in 0..1; what is not is reported and clamped.
+fn factor<const N: usize>(json: &Value, name: &str, default: [f32; N], place: &str, faults: &mut Faults) -> [f32; N] {
+    let Some(value) = json.get(name) else { return default };
+    let Some(given) = numbers::<N>(value) else {
+        faults.warning(place, format!("{name} is {}, not {N} numbers; ignored", shown(Some(value))), "correct it");
+        return default;
+    };
+    if given.iter().any(|x| !(0.0..=1.0).contains(x)) {
+        let what = format!("{name} is {given:?}; clamped to 0..1");
+        faults.warning(place, what, "no surface reflects more light than it gets; emission has emissiveStrength");
+    }
+    given.map(|x| x.clamp(0.0, 1.0) as f32)
+}
+
+/// Pictures, decoded when the first material uses them.
+struct Pictures<'a> {
+    document: &'a Document,
+    file: &'a str,
+    /// By image index: not yet tried, or the texture that came of it.
+    decoded: Vec<Option<Option<usize>>>,
+    textures: Vec<Texture>,
+    budget: u64,
+}
+
+impl Pictures<'_> {
+    /// A material's reference to a picture; `None`, with a warning, where it cannot be used.
+    fn used(&mut self, info: Option<&Value>, place: &str, faults: &mut Faults) -> Option<TextureRef> {
+        let info = info?;
+        let index = info.get("index").and_then(whole);
+        let textures = list(&self.document.json, "textures");
+        let Some(json) = index.and_then(|index| textures.get(index)) else {
+            let what = format!("texture {} of {}; the picture is ignored", shown(info.get("index")), textures.len());
+            faults.warning(place, what, "export the model again");
+            return None;
+        };
+
+        let transform = info.get("extensions").and_then(|all| all.get("KHR_texture_transform"));
+        let set = transform.and_then(|t| t.get("texCoord")).or_else(|| info.get("texCoord"));
+        let uv_set = set.map_or(Some(0), whole).filter(|set| *set < 2);
+        let Some(uv_set) = uv_set else {
+            let what = format!("texture coordinates {}; the picture is ignored", shown(set));
+            faults.warning(place, what, "only sets 0 and 1 are read");
+            return None;
+        };
+        let wrap = wrap(json.get("sampler").and_then(whole).and_then(|i| list(&self.document.json, "samplers").get(i)));
+        let texture = self.decode(json, place, faults)?;
+        Some(TextureRef { texture, uv_set, transform: transform.map_or(DAffine2::IDENTITY, uv_transform), wrap })
+    }
+
+    fn decode(&mut self, texture: &Value, place: &str, faults: &mut Faults) -> Option<usize> {
+        let Some(source) = texture.get("source").and_then(whole) else {
+            let other = texture.get("extensions").and_then(Value::as_object).and_then(|all| all.keys().next());
+            let what = match other {
+                Some(extension) => format!("its picture is only there as {extension}; ignored"),
+                None => "its texture names no picture; ignored".to_owned(),
+            };
+            faults.warning(place, what, "export with PNG or JPEG pictures");
+            return None;
+        };
+        let Some(slot) = self.decoded.get_mut(source) else {
+            faults.warning(place, format!("image {source} does not exist; ignored"), "export the model again");
+            return None;
+        };
+        if let Some(known) = slot {
+            return *known;
+        }
+        // What could not be loaded was reported when the document was read.
+        let texture = self.document.images.get(source).and_then(Option::as_ref).and_then(|encoded| {
+            let json = list(&self.document.json, "images").get(source)?;
+            let uri = text(json, "uri");
+            let name = match (text(json, "name"), uri) {
+                ("", uri) if uri.is_empty() || uri.starts_with("data:") => format!("image {source}"),
+                ("", uri) => uri.to_owned(),
+                (name, _) => name.to_owned(),
+            };
+            match picture::decode(&name, &encoded.bytes, &mut self.budget) {
+                Ok(texture) => Some(texture),
+                Err(what) => {
+                    let place = format!("{}: images[{source}] '{name}'", self.file);
+                    faults.warning(place, format!("cannot be decoded: {what}; ignored"), "export it as PNG or JPEG");
+                    None
+                }
+            }
+        });
+        let index = texture.map(|texture| {
+            self.textures.push(texture);
+            self.textures.len() - 1
+        });
+        *slot = Some(index);
+        index
+    }
+}
+
+fn wrap(sampler: Option<&Value>) -> [Wrap; 2] {
+    ["wrapS", "wrapT"].map(|name| match sampler.and_then(|s| s.get(name)).and_then(whole) {
+        Some(33071) => Wrap::Clamp,
+        Some(33648) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    })
+}
+
+/// KHR_texture_transform: scale, then turn, then move.
+fn uv_transform(json: &Value) -> DAffine2 {
+    let offset = json.get("offset").and_then(numbers::<2>).map_or(DVec2::ZERO, DVec2::from);
+    let scale = json.get("scale").and_then(numbers::<2>).map_or(DVec2::ONE, DVec2::from);
+    let rotation = json.get("rotation").and_then(number).unwrap_or(0.0);
+    let (sin, cos) = rotation.sin_cos();
+    // The turn is counter-clockwise as seen, with v pointing down: the reverse of one with v pointing up.
+    let turn = DMat2::from_cols(DVec2::new(cos, -sin), DVec2::new(sin, cos));
+    DAffine2::from_mat2_translation(turn * DMat2::from_diagonal(scale), offset)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn read_one(material: Value) -> (Material, Faults) {
+        let mut faults = Faults::default();
+        let document = Document { json: json!({ "materials": [material] }), ..Document::default() };
+        let mut read = read(&document, "t", &mut faults);
+        (read.materials.swap_remove(0), faults)
+    }
+
+    #[test]
+    fn reads_factors_and_strength() {
+        let (material, faults) = read_one(json!({
+            "name": "lamp", "doubleSided": true, "alphaMode": "MASK", "emissiveFactor": [1, 0.5, 0.25],
+            "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.75},
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 400}}}));
+        assert_eq!(material.base_color, [0.1, 0.2, 0.3, 0.4]);
+        assert_eq!(material.metallic, 0.75);
+        assert_eq!(material.emissive, [400.0, 200.0, 100.0]);
+        assert_eq!(material.alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
+        assert!(material.double_sided && faults.0.is_empty(), "{faults}");
+    }
+
+    #[test]
+    fn colours_outside_0_to_1_are_clamped_with_a_warning() {
+        let (material, faults) = read_one(json!({"pbrMetallicRoughness": {"baseColorFactor": [1.5, -0.1, 1.0, 1]}}));
+        assert_eq!(material.base_color, [1.0, 0.0, 1.0, 1.0]);
+        assert!(faults.to_string().contains("clamped"), "{faults}");
+    }
+
+    #[test]
+    fn unlit_gives_no_light_and_is_no_metal() {
+        let (material, faults) =
+            read_one(json!({"emissiveFactor": [1, 1, 1], "extensions": {"KHR_materials_unlit": {}}}));
+        assert_eq!((material.metallic, material.emissive), (0.0, [0.0; 3]));
+        assert!(faults.to_string().contains("unlit"), "{faults}");
+    }
+
+    #[test]
+    fn emission_beyond_single_precision_is_an_error() {
+        let (material, faults) = read_one(json!({"emissiveFactor": [1, 1, 1],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 1e300}}}));
+        assert!(faults.has_errors() && !material.emits());
+    }
+}

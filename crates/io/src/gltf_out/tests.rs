@@ -1,0 +1,349 @@
+use super::*;
+use crate::{LoadOptions, Memory, gltf};
+use glam::{DVec3, Vec2, Vec3};
+use radiosity_scene::{Material, Up};
+use serde_json::{Value, json};
+
+/// Bytes of the attributes and an index list for one square: positions, normals, joints, weights, matrices.
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+/// A unit square in the plane z = 0 on five nodes: plain, mirrored, twice instanced, skinned, and bent by a morph
+/// target; an accessor that nobody uses; extras and an unknown extension.
+fn source() -> Value {
+    let corners = [0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.];
+    let parts: Vec<Vec<u8>> = vec![
+        floats(&corners),
+        floats(&[0., 0., 1.].repeat(4)),
+        vec![0, 0, 1, 0, 2, 0, 0, 0, 2, 0, 3, 0],
+        floats(&[1., 0.5, 0.25].repeat(4)),
+        [[0_u8, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0]].concat(),
+        floats(&[1., 0., 0., 0.].repeat(4)),
+        floats(&[0., 0., 0., 0., 0., 0., 0., 0., 1., 0., 0., 1.]),
+        floats(&[3., 0., 0., 6., 0., 0.]),
+        floats(&[1., 1., 1., 1., -1., 1.]),
+        floats(&[9.0; 500]),
+    ];
+    let mut bytes = Vec::new();
+    let mut views = Vec::new();
+    for part in &parts {
+        views.push(json!({ "buffer": 0, "byteOffset": bytes.len(), "byteLength": part.len() }));
+        bytes.extend(part);
+    }
+    let accessor = |view: usize, component: u32, count: u32, kind: &str| json!({ "bufferView": view, "componentType": component, "count": count, "type": kind });
+    let mut position = accessor(0, 5126, 4, "VEC3");
+    position["min"] = json!([0, 0, 0]);
+    position["max"] = json!([1, 1, 0]);
+    let mut moved = accessor(6, 5126, 4, "VEC3");
+    moved["min"] = json!([0, 0, 0]);
+    moved["max"] = json!([0, 0, 1]);
+    let primitive = json!({ "attributes": { "POSITION": 0, "NORMAL": 1, "COLOR_0": 3 }, "indices": 2, "material": 0,
+        "extras": { "kept": "part" } });
+    let mut skinned = primitive.clone();
+    skinned["attributes"]["JOINTS_0"] = 4.into();
+    skinned["attributes"]["WEIGHTS_0"] = 5.into();
+    let mut morphed = primitive.clone();
+    morphed["targets"] = json!([{ "POSITION": 6 }]);
+    let data: String = {
+        use base64::Engine;
+        base64::engine::general_purpose::STANDARD.encode(&bytes)
+    };
+    json!({
+        "asset": { "version": "2.0", "generator": "somebody", "copyright": "kept" },
+        "extensionsUsed": ["EXT_mesh_gpu_instancing"],
+        "extensionsRequired": ["EXT_mesh_gpu_instancing"],
+        "scene": 0,
+        "scenes": [{ "nodes": [0, 1, 2, 3, 4] }],
+        "nodes": [
+            { "mesh": 0, "name": "plain", "extras": { "kept": 1 } },
+            { "mesh": 0, "name": "mirrored", "scale": [-1, 1, 1], "translation": [0, 5, 0] },
+            { "mesh": 0, "name": "many", "translation": [0, 0, 7],
+              "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": 7, "SCALE": 8 } } } },
+            { "mesh": 1, "name": "bent", "skin": 0, "children": [5, 6] },
+            { "mesh": 2, "name": "morphed", "translation": [0, -5, 0] },
+            { "name": "a" }, { "name": "b", "translation": [0, 0, 2] },
+        ],
+        "skins": [{ "joints": [5, 6] }],
+        "meshes": [
+            { "primitives": [primitive], "name": "square" },
+            { "primitives": [skinned] },
+            { "primitives": [morphed], "weights": [0.5] },
+        ],
+        "materials": [{ "name": "paint", "extras": { "kept": 2 },
+            "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0 } }],
+        "accessors": [
+            position, accessor(1, 5126, 4, "VEC3"), accessor(2, 5123, 6, "SCALAR"), accessor(3, 5126, 4, "VEC3"),
+            accessor(4, 5121, 4, "VEC4"), accessor(5, 5126, 4, "VEC4"), moved, accessor(7, 5126, 2, "VEC3"),
+            accessor(8, 5126, 2, "VEC3"), accessor(9, 5126, 500, "SCALAR"),
+        ],
+        "bufferViews": views,
+        "buffers": [{ "byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{data}") }],
+        "extras": { "bufferView": 3, "kept": "all" },
+    })
+}
+
+fn load(bytes: &[u8]) -> crate::Loaded {
+    gltf::load("t.gltf", bytes, &Memory::default(), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Every triangle cut in two at the middle of its first side, with light of the given kind.
+fn halved(scene: &Scene, light: impl Fn(&[DVec3]) -> Light) -> Vec<LitPrimitive> {
+    let cut = |index: usize| {
+        let object = &scene.objects[index];
+        let first = object.vertices.start as u32;
+        let (mut vertices, mut triangles, mut points) = (Vec::new(), Vec::new(), Vec::new());
+        for t in object.triangles.clone() {
+            let [a, b, c] = scene.triangles[t].map(|v| v - first);
+            let base = vertices.len() as u32;
+            for corner in [a, b, c] {
+                vertices.push(LitVertex { corners: [corner; 3], weights: [1.0, 0.0, 0.0] });
+            }
+            vertices.push(LitVertex { corners: [a, b, c], weights: [0.5, 0.5, 0.0] });
+            triangles.extend([[base, base + 3, base + 2], [base + 3, base + 1, base + 2]]);
+            let [p, q, r] = scene.corners(t);
+            points.extend([p, q, r, 0.5 * (p + q)]);
+        }
+        LitPrimitive { object: index, vertices, triangles, flipped: false, light: light(&points) }
+    };
+    (0..scene.objects.len()).map(cut).collect()
+}
+
+/// A value that tells places apart: lx by world position.
+fn field(p: DVec3) -> Bands {
+    [(100.0 + 10.0 * p.x) as f32, (50.0 + p.y) as f32, (20.0 + p.z) as f32]
+}
+
+fn at_vertices(points: &[DVec3]) -> Light {
+    Light::Vertex { irradiance: points.iter().map(|&p| field(p)).collect() }
+}
+
+fn on_page(points: &[DVec3]) -> Light {
+    Light::Lightmap { page: 0, uv: vec![[0.25, 0.75]; points.len()] }
+}
+
+fn pages() -> Vec<PageImage> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(4, 4, image::Rgb([255; 3])).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    vec![PageImage { png: png.into_inner(), intensity: 200.0 }]
+}
+
+fn vector_area(scene: &Scene, object: usize) -> DVec3 {
+    let cross = |t: usize| {
+        let [a, b, c] = scene.corners(t);
+        0.5 * (b - a).cross(c - a)
+    };
+    scene.objects[object].triangles.clone().map(cross).sum()
+}
+
+#[test]
+fn every_kind_of_node_stands_where_it_stood_and_faces_as_it_faced() {
+    let before = load(source().to_string().as_bytes());
+    assert_eq!(before.scene.objects.len(), 6);
+    for (style, light) in [
+        (Style::Vertices, at_vertices as fn(&[DVec3]) -> Light),
+        (Style::Unlit { exposure: 0.01 }, at_vertices),
+        (Style::Lightmap { pages: pages(), encoding: Encoding::Srgb, exposure: 1.0 }, on_page),
+    ] {
+        let lit = halved(&before.scene, light);
+        let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &style).unwrap());
+        assert_eq!(after.scene.triangles.len(), 2 * before.scene.triangles.len());
+        // Instances moved behind their node; their numbers in the list may differ, their sums may not.
+        let sums = |scene: &Scene| {
+            let mut sums: Vec<(String, [i64; 3])> = (0..scene.objects.len())
+                .map(|i| {
+                    let name = scene.objects[i].name.clone();
+                    let name = if name.starts_with("instance") { "many".to_owned() } else { name };
+                    (name, vector_area(scene, i).to_array().map(|x| (x * 1e4).round() as i64))
+                })
+                .collect();
+            sums.sort();
+            sums
+        };
+        assert_eq!(sums(&before.scene), sums(&after.scene));
+        let bounds = |scene: &Scene| scene.bounding_box().unwrap();
+        assert!((bounds(&before.scene)[0] - bounds(&after.scene)[0]).length() < 1e-6);
+        assert!((bounds(&before.scene)[1] - bounds(&after.scene)[1]).length() < 1e-6);
+    }
+}
+
+#[test]
+fn what_the_author_wrote_survives_and_what_nobody_uses_goes() {
+    let before = load(source().to_string().as_bytes());
+    let lit = halved(&before.scene, at_vertices);
+    let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &Style::Vertices).unwrap());
+    let document = after.document.unwrap();
+    let json = &document.json;
+    assert_eq!(json["asset"]["copyright"], "kept");
+    assert_eq!(json["nodes"][0]["extras"]["kept"], 1);
+    assert_eq!(json["materials"][0]["extras"]["kept"], 2);
+    // The author's own numbers are not ours to renumber.
+    assert_eq!(json["extras"], json!({ "bufferView": 3, "kept": "all" }));
+    assert_eq!(json["meshes"][0]["primitives"][0]["extras"]["kept"], "part");
+    assert_eq!(json["meshes"][0]["name"], "square");
+    assert_eq!(json.get("extensionsUsed"), None);
+    let size = document.buffers[0].len();
+    assert!(size < 20_000 && document.buffers.len() == 1);
+    let counts: Vec<u64> = json["accessors"].as_array().unwrap().iter().filter_map(|a| a["count"].as_u64()).collect();
+    assert!(!counts.contains(&500), "an accessor that nobody uses was kept: {counts:?}");
+}
+
+#[test]
+fn vertex_light_stands_beside_the_authors_colours() {
+    let before = load(source().to_string().as_bytes());
+    let lit = halved(&before.scene, at_vertices);
+    let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &Style::Vertices).unwrap());
+    let document = after.document.unwrap();
+    let mut seen = 0;
+    for object in &after.scene.objects {
+        let mesh = &document.json["meshes"][object.source.mesh]["primitives"][object.source.primitive];
+        let light = mesh["attributes"]["_IRRADIANCE"].as_u64().unwrap() as usize;
+        let light = document.read_vec3(light).unwrap();
+        for (value, vertex) in light.iter().zip(object.vertices.clone()) {
+            let expected = Vec3::from(field(after.scene.positions[vertex]));
+            assert!((*value - expected).length() < 1e-3, "{value} {expected}");
+            assert_eq!(after.scene.colors[vertex], [1.0, 0.5, 0.25, 1.0]);
+            seen += 1;
+        }
+    }
+    assert_eq!(seen, 6 * 8);
+}
+
+#[test]
+fn a_lightmap_goes_onto_a_copy_of_the_material_in_the_next_free_set() {
+    let before = load(source().to_string().as_bytes());
+    let lit = halved(&before.scene, on_page);
+    let style = Style::Lightmap { pages: pages(), encoding: Encoding::Linear, exposure: 0.5 };
+    let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &style).unwrap());
+    let json = &after.document.as_ref().unwrap().json;
+    let primitive = &json["meshes"][0]["primitives"][0];
+    assert_eq!(primitive["attributes"]["TEXCOORD_0"], primitive["attributes"]["TEXCOORD_1"]);
+    assert_eq!(after.scene.uvs[1][0], Vec2::new(0.25, 0.75));
+    let material = &json["materials"][primitive["material"].as_u64().unwrap() as usize];
+    assert_eq!(material["name"], "paint");
+    let light = &material["extensions"]["MOZ_lightmap"];
+    assert_eq!((&light["texCoord"], &light["intensity"]), (&json!(1), &json!(100.0)));
+    let texture = &json["textures"][light["index"].as_u64().unwrap() as usize];
+    assert_eq!(texture["extras"]["encoding"], "linear");
+    assert_eq!(texture["extras"]["scale"], 200.0);
+    assert_eq!(json["materials"].as_array().unwrap().len(), 2);
+    assert!(json["materials"][0].get("extensions").is_none());
+}
+
+#[test]
+fn both_sides_of_a_surface_become_two_single_sided_layers() {
+    let mut json = source();
+    json["materials"][0]["doubleSided"] = true.into();
+    let before = load(json.to_string().as_bytes());
+    let mut lit = halved(&before.scene, at_vertices);
+    let mut back = lit[0].clone();
+    back.flipped = true;
+    for triangle in &mut back.triangles {
+        triangle.swap(1, 2);
+    }
+    lit.push(back);
+    let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &Style::Vertices).unwrap());
+    let layers: Vec<usize> =
+        (0..after.scene.objects.len()).filter(|&i| after.scene.objects[i].name == "plain").collect();
+    assert_eq!(layers.len(), 2);
+    assert_eq!(vector_area(&after.scene, layers[0]), -vector_area(&after.scene, layers[1]));
+    for (layer, sign) in layers.into_iter().zip([1.0, -1.0]) {
+        let object = &after.scene.objects[layer];
+        assert!(!after.scene.materials[object.material].double_sided);
+        assert_eq!(after.scene.normals[object.vertices.start], sign * Vec3::Z);
+    }
+    assert!(after.scene.materials[after.scene.objects.last().unwrap().material].double_sided);
+}
+
+#[test]
+fn unlit_colours_are_exposed_luminance_and_lamps_shine() {
+    let mut scene = Scene::default();
+    let lamp =
+        Material { name: "lamp".into(), emissive: [40.0, 20.0, 0.0], base_color: [0.5; 4], ..Material::default() };
+    scene.materials = vec![Material { base_color: [0.5, 0.5, 0.5, 1.0], ..Material::default() }, lamp];
+    let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+    scene.add_quad("wall", 0, square);
+    scene.add_quad("lamp", 1, square.map(|p| p + DVec3::Z));
+    let even = |points: &[DVec3]| Light::Vertex { irradiance: vec![[std::f32::consts::PI; 3]; points.len()] };
+    let lit = halved(&scene, even);
+    let bytes = lit_glb(&scene, None, &lit, &Style::Unlit { exposure: 0.02 }).unwrap();
+    let mut faults = radiosity_scene::Faults::default();
+    let document = Document::read("t.glb", &bytes, &Memory::default(), &mut faults).unwrap();
+    let color = |mesh: usize| {
+        let primitive = &document.json["meshes"][mesh]["primitives"][0];
+        let material = &document.json["materials"][primitive["material"].as_u64().unwrap() as usize];
+        assert!(material["extensions"]["KHR_materials_unlit"].is_object());
+        let factor = material["pbrMetallicRoughness"]["baseColorFactor"][0].as_f64().unwrap();
+        let color = primitive["attributes"]["COLOR_0"].as_u64().unwrap() as usize;
+        (document.read_colors(color).unwrap()[0], factor)
+    };
+    // The wall: E/π = 1 cd/m² times the exposure, the albedo stays in the material.
+    let (wall, albedo) = color(0);
+    assert!((wall[0] - 0.02).abs() < 1e-6 && albedo == 0.5, "{wall:?}");
+    // The lamp: 40 cd/m² and what it reflects.
+    let (lamp, factor) = color(1);
+    assert!((lamp[0] - 0.02 * 40.5).abs() < 1e-6 && (lamp[2] - 0.02 * 0.5).abs() < 1e-6 && factor == 1.0, "{lamp:?}");
+}
+
+#[test]
+fn a_scene_without_gltf_comes_back_as_it_was() {
+    let mut scene = Scene { up: Up::Z, name: "room".into(), ..Scene::default() };
+    let lamp = Material { name: "lamp".into(), emissive: [4.0, 2.0, 0.0], ..Material::default() };
+    scene.materials = vec![Material { name: "wall".into(), ..Material::default() }, lamp];
+    let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 2.0, 0.0), DVec3::Y * 2.0];
+    scene.add_quad("floor", 0, square);
+    scene.add_quad("lamp", 1, square.map(|p| p + DVec3::Z));
+    scene.cameras.push(radiosity_scene::Camera::look_at("eye", DVec3::splat(3.0), DVec3::ZERO, DVec3::Z, 1.0));
+    let lit = halved(&scene, at_vertices);
+    // The lamp gets no light of its own and is written all the same.
+    let bytes = lit_glb(&scene, None, &lit[..1], &Style::Vertices).unwrap();
+    let after = load(&bytes).scene;
+    assert_eq!(after.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(), ["floor", "lamp"]);
+    assert_eq!(after.materials[after.objects[1].material].emissive, [4.0, 2.0, 0.0]);
+    assert_eq!((after.objects[0].triangles.len(), after.objects[1].triangles.len()), (4, 2));
+    // +Z up became +Y up.
+    assert!((vector_area(&after, 0) - 2.0 * DVec3::Y).length() < 1e-6, "{}", vector_area(&after, 0));
+    let eye = after.cameras[0].world_from_camera.w_axis.truncate();
+    assert!((eye - DVec3::new(3.0, 3.0, -3.0)).length() < 1e-5, "{eye}");
+}
+
+#[test]
+fn a_file_is_written_whole_or_not_at_all() {
+    let before = load(source().to_string().as_bytes());
+    let folder = std::env::temp_dir().join(format!("radiosity-lit-{}", std::process::id()));
+    let lit = halved(&before.scene, at_vertices);
+    let write = |lit: &[LitPrimitive], file: &str| {
+        write_lit(&before.scene, before.document.as_ref(), lit, &Style::Vertices, &folder.join(file))
+    };
+    assert!(matches!(write(&lit, "a.glb"), Err(WriteError::NoFolder(_))));
+    std::fs::create_dir(&folder).unwrap();
+    write(&lit, "a.glb").unwrap();
+    let first = std::fs::read(folder.join("a.glb")).unwrap();
+    // Wrong input leaves the old file alone; a name that is a folder leaves nothing behind.
+    let mut wrong = lit.clone();
+    wrong[2].vertices[1].corners[2] = 99;
+    assert!(matches!(write(&wrong, "a.glb"), Err(WriteError::Primitive { primitive: 2, .. })));
+    wrong[2] = LitPrimitive { light: Light::Vertex { irradiance: vec![] }, ..lit[2].clone() };
+    assert!(matches!(write(&wrong, "a.glb"), Err(WriteError::Primitive { primitive: 2, .. })));
+    assert_eq!(std::fs::read(folder.join("a.glb")).unwrap(), first);
+    std::fs::create_dir(folder.join("b.glb")).unwrap();
+    assert!(matches!(write(&lit, "b.glb"), Err(WriteError::Io { .. })));
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn nothing_that_is_not_finite_is_written() {
+    let before = load(source().to_string().as_bytes());
+    let bad = |points: &[DVec3]| Light::Vertex { irradiance: vec![[f32::NAN, f32::INFINITY, 1.0]; points.len()] };
+    for style in [Style::Vertices, Style::Unlit { exposure: f32::NAN }] {
+        let lit = halved(&before.scene, bad);
+        let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &style).unwrap());
+        let document = after.document.unwrap();
+        for index in 0..document.json["accessors"].as_array().unwrap().len() {
+            if let Ok((values, _)) = document.read_components(index, &[1, 2, 3, 4]) {
+                assert!(values.iter().all(|v| v.is_finite()), "accessors[{index}]");
+            }
+        }
+    }
+}

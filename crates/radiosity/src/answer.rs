@@ -1,0 +1,127 @@
+//! Reading a solution at points: direct light there and then, indirect light gathered or interpolated.
+
+use crate::monitor::{Monitor, Watch};
+use crate::{Error, Solution};
+use glam::DVec2;
+use radiosity_scene::{Bands, Side};
+use radiosity_trace::Place;
+use radiosity_transport::{PointReceivers, Shadowing};
+use radiosity_view::Field;
+use rayon::prelude::*;
+
+/// A place on the surface, as pictures and lightmaps ask for it.
+#[derive(Clone, Copy, Debug)]
+pub struct Station {
+    /// The point and the normal it receives with.
+    pub place: Place,
+    /// Barycentric coordinates on the place's triangle.
+    pub uv: DVec2,
+    /// Side of the triangle.
+    pub side: Side,
+}
+
+/// Where the indirect light at a point comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum Indirect<'f> {
+    /// Cosine rays from the point itself, looking up what they meet: exact in contacts and corners.
+    Gather {
+        /// Number of rays.
+        rays: usize,
+    },
+    /// The continuous field over the elements: smooth, and free.
+    Field(&'f Field),
+}
+
+/// Irradiance at points.
+#[derive(Clone, Debug, Default)]
+pub struct Answer {
+    /// Total irradiance, lux per band.
+    pub irradiance: Vec<Bands>,
+    /// Its direct part.
+    pub direct: Vec<Bands>,
+    /// Standard error of the gathered part, lux per band; zero for fields.
+    pub standard_error: Vec<Bands>,
+}
+
+impl Solution<'_> {
+    /// The continuous field of the indirect irradiance.
+    pub fn indirect_field(&self) -> Field {
+        Field::new(self.tracer().mesh, &self.elements, self.indirect(), &self.exposed_area())
+    }
+
+    /// Irradiance at stations, direct light with the given shadow rays.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn at(
+        &self,
+        stations: &[Station],
+        indirect: Indirect,
+        shadowing: &Shadowing,
+        monitor: &dyn Monitor,
+    ) -> Result<Answer, Error> {
+        let places: Vec<Place> = stations.iter().map(|s| s.place).collect();
+        match indirect {
+            Indirect::Gather { rays } => self.gathered(&places, rays, shadowing, monitor),
+            Indirect::Field(field) => {
+                let direct = self.direct_at(&places, shadowing, monitor)?;
+                let irradiance = stations
+                    .par_iter()
+                    .zip(&direct)
+                    .map(|(s, d)| {
+                        let h = field.at(s.place.triangle as usize, s.uv, s.side);
+                        std::array::from_fn(|band| d[band] + h[band])
+                    })
+                    .collect();
+                Ok(Answer { irradiance, direct, standard_error: vec![[0.0; 3]; stations.len()] })
+            }
+        }
+    }
+
+    /// Irradiance at places by a final gather of `rays` rays.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn gathered(
+        &self,
+        places: &[Place],
+        rays: usize,
+        shadowing: &Shadowing,
+        monitor: &dyn Monitor,
+    ) -> Result<Answer, Error> {
+        let direct = self.direct_at(places, shadowing, monitor)?;
+        let halves = self.stages.time(monitor, "gather", || {
+            self.gather().irradiance(&PointReceivers { places }, rays, &Watch(monitor))
+        })?;
+        let mut answer = Answer { direct, ..Answer::default() };
+        for ([a, b], d) in halves.iter().zip(&answer.direct) {
+            answer.irradiance.push(std::array::from_fn(|k| d[k] + 0.5 * (a[k] + b[k])));
+            answer.standard_error.push(std::array::from_fn(|k| 0.5 * (a[k] - b[k]).abs()));
+        }
+        Ok(answer)
+    }
+
+    /// Direct irradiance of all lights at places.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn direct_at(
+        &self,
+        places: &[Place],
+        shadowing: &Shadowing,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Bands>, Error> {
+        let receivers = PointReceivers { places };
+        let mut sum = vec![[0f32; 3]; places.len()];
+        self.stages.time(monitor, "direct light", || -> Result<(), Error> {
+            for light in 0..self.luminaires.lights.len() {
+                let column = self.luminaires.column(light, self.tracer(), &receivers, shadowing, &Watch(monitor))?;
+                for (sum, (e, _)) in sum.iter_mut().zip(&column) {
+                    (0..3).for_each(|band| sum[band] += e[band]);
+                }
+            }
+            Ok(())
+        })?;
+        Ok(sum)
+    }
+}

@@ -1,0 +1,36 @@
+//! What can go wrong between a scene and its light.
+
+/// Why no answer came.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The run was stopped from outside.
+    #[error("stopped on request")]
+    Stopped,
+    /// The solver did not reach its tolerance.
+    #[error("the radiosity equation was not solved: {0}")]
+    Solve(#[from] radiosity_solve::SolveError),
+    /// The memory that was allowed does not suffice.
+    #[error(
+        "{elements} elements with {rays} rays each need {needed} MB; {allowed} MB are allowed (use larger elements or allow more)"
+    )]
+    Memory {
+        /// Elements asked for.
+        elements: usize,
+        /// Rays per element.
+        rays: usize,
+        /// Megabytes needed.
+        needed: usize,
+        /// Megabytes allowed.
+        allowed: usize,
+    },
+    /// The scene has nothing to compute.
+    #[error("{0}")]
+    Empty(&'static str),
+}
+
+impl From<radiosity_transport::Stopped> for Error {
+    fn from(_: radiosity_transport::Stopped) -> Self {
+        Error::Stopped
+    }
+}

@@ -1,0 +1,172 @@
+//! Illuminance at points, to an asked error.
+//!
+//! A coarse solution supplies the radiosities that a final gather at each point looks up; errors of single elements
+//! average out over its rays. The referee watches a part of the points; rays are doubled until its upper bound meets
+//! the target, or until the budget ends, and the report says which.
+
+use crate::monitor::{Monitor, Stages};
+use crate::{Error, Solution, SolveOptions, stations};
+use glam::DVec3;
+use radiosity_scene::Bands;
+use radiosity_trace::{Place, Tracer};
+use radiosity_transport::Shadowing;
+use radiosity_view::{Audit, Auditor};
+use serde::Serialize;
+
+/// How to measure.
+#[derive(Clone, Copy, Debug)]
+pub struct MeasureOptions {
+    /// Relative L2 error to reach, e.g. 0.01.
+    pub error: f64,
+    /// How to solve; its rays and shadow rays are the least that is used.
+    pub solve: SolveOptions,
+    /// Points that the referee examines.
+    pub audit_points: usize,
+    /// Rounds of refinement, each with twice the rays of the one before.
+    pub rounds: usize,
+    /// Seed of the audit.
+    pub seed: u64,
+}
+
+impl Default for MeasureOptions {
+    fn default() -> Self {
+        MeasureOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 1000, rounds: 5, seed: 1 }
+    }
+}
+
+/// One round of refinement.
+#[derive(Clone, Debug, Serialize)]
+pub struct Round {
+    /// Elements.
+    pub elements: usize,
+    /// Rays per element.
+    pub rays: usize,
+    /// Gather rays per point; zero where the field was interpolated.
+    pub gather: usize,
+    /// Shadow rays per light in penumbrae.
+    pub shadow_rays: u32,
+    /// Estimated error.
+    pub error: f64,
+    /// Its upper bound.
+    pub upper: f64,
+    /// Seconds since the start.
+    pub seconds: f64,
+}
+
+/// Irradiance at points, and how far to trust it.
+#[derive(Clone, Debug)]
+pub struct Measurement {
+    /// Irradiance, lux per band.
+    pub irradiance: Vec<Bands>,
+    /// What the referee says.
+    pub audit: Audit,
+    /// Whether the audit's upper bound meets the asked error.
+    pub achieved: bool,
+    /// The rounds.
+    pub rounds: Vec<Round>,
+    /// Time by stage.
+    pub stages: Stages,
+    /// Solver's residual by band.
+    pub residual: Vec<f64>,
+    /// Guaranteed bound of the solver's error by band, lm/m².
+    pub bound: Vec<f64>,
+}
+
+/// `base` at 1 %, growing with the accuracy asked as stratified sampling needs (error ∝ M^−0.7), as a power of two.
+pub(crate) fn rays_for(error: f64, base: f64, least: usize, most: usize) -> usize {
+    let wanted = (base * (0.01 / error).powf(1.4)).clamp(least as f64, most as f64) as usize;
+    wanted.next_power_of_two().min(most)
+}
+
+/// Measures irradiance at points with unit normals.
+///
+/// # Errors
+/// As [`Solution::new`]. Not reaching the error asked is not an error: see [`Measurement::achieved`].
+pub fn measure(
+    tracer: &Tracer,
+    points: &[(DVec3, DVec3)],
+    options: &MeasureOptions,
+    monitor: &dyn Monitor,
+) -> Result<Measurement, Error> {
+    let start = std::time::Instant::now();
+    let stages = Stages::default();
+    let places: Vec<Place> = points.iter().map(|(p, n)| stations::snap(tracer, *p, *n)).collect();
+    let mut solve = options.solve;
+    solve.rays = solve.rays.max(rays_for(options.error, 64.0, 16, 1024));
+    let mut gather = rays_for(options.error, 256.0, 32, 8192);
+    let mut shadowing = Shadowing { pilot: 32, mixed: rays_for(options.error, 256.0, 64, 8192) as u32 };
+    let mut solution = Solution::new(tracer, &solve, monitor)?;
+
+    // The referee looks at every n-th point.
+    let stride = places.len().div_ceil(options.audit_points.max(1)).max(1);
+    let watched: Vec<usize> = (0..places.len()).step_by(stride).collect();
+    let mut auditor = Auditor::new(tracer, watched.iter().map(|&i| places[i]).collect(), options.seed);
+    let most_paths = rays_for(options.error, 4096.0, 64, 1 << 16) as u32;
+    let mut rounds = Vec::new();
+    loop {
+        let answer = solution.gathered(&places, gather, &shadowing, monitor)?;
+        let watched: Vec<Bands> = watched.iter().map(|&i| answer.irradiance[i]).collect();
+        let audit = certify(&mut auditor, &watched, options.error, most_paths, &stages, monitor)?;
+        rounds.push(Round {
+            elements: solution.elements.len(),
+            rays: solution.rays(),
+            gather,
+            shadow_rays: shadowing.mixed,
+            error: audit.error,
+            upper: audit.upper,
+            seconds: start.elapsed().as_secs_f64(),
+        });
+        let achieved = audit.upper <= options.error;
+        if achieved || rounds.len() > options.rounds || places.is_empty() {
+            stages.absorb(&solution.stages);
+            return Ok(Measurement {
+                irradiance: answer.irradiance,
+                audit,
+                achieved,
+                rounds,
+                stages,
+                residual: solution.info.residual.clone(),
+                bound: solution.info.bound.clone(),
+            });
+        }
+        gather *= 2;
+        shadowing.mixed *= 2;
+        let rays = 2 * solution.rays();
+        let smaller = solution.element_size / std::f64::consts::SQRT_2;
+        if rounds.len() % 2 == 0 && options.solve.element_size.is_none() {
+            // Rays alone did not do: smaller elements as well.
+            let finer = SolveOptions { element_size: Some(smaller), rays, ..solve };
+            stages.absorb(&solution.stages);
+            solution = Solution::new(tracer, &finer, monitor)?;
+        } else {
+            solution.refine(rays, monitor)?;
+        }
+    }
+}
+
+/// Judges an answer, spending the referee's paths only while they can still decide.
+pub(crate) fn certify(
+    auditor: &mut Auditor,
+    h: &[Bands],
+    target: f64,
+    most_paths: u32,
+    stages: &Stages,
+    monitor: &dyn Monitor,
+) -> Result<Audit, Error> {
+    stages.time(monitor, "audit", || {
+        let total = auditor.places().len();
+        if auditor.paths() == 0 && !auditor.trace(64, |done| monitor.step(done, total)) {
+            return Err(Error::Stopped);
+        }
+        loop {
+            let audit = auditor.judge(h);
+            let open = audit.upper > target && audit.error <= target && 2 * auditor.paths() <= most_paths;
+            if !open {
+                return Ok(audit);
+            }
+            if !auditor.trace(2 * auditor.paths(), |done| monitor.step(done, total)) {
+                return Err(Error::Stopped);
+            }
+        }
+    })
+}

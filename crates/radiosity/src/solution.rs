@@ -1,0 +1,376 @@
+//! The solution: radiosity on elements, and all that is needed to read it, refine it, and re-light it.
+//!
+//! The unknown is X = B − P, the radiosity without the part P that [`Luminaires`] carry to every receiver directly:
+//! X = (E − P) + R (D + S + F X), with D the direct irradiance and S the sky's, both known before the solve.
+
+use crate::Error;
+use crate::monitor::{Monitor, Stages, Watch};
+use radiosity_scene::{Bands, Elements, SkyPatches};
+use radiosity_solve::{DiffuseResponse, Go, Info, Params, jacobi};
+use radiosity_trace::Tracer;
+use radiosity_transport::{ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires, Shadowing};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Elements that the program aims for on top of one per triangle, when it chooses their size itself. At ten thousand
+/// the walls of a room are cut into cells of some 15 cm; their light varies by a few percent from cell to cell.
+const AUTOMATIC_ELEMENTS: f64 = 10_000.0;
+
+/// How to solve.
+#[derive(Clone, Copy, Debug)]
+pub struct SolveOptions {
+    /// Width of an element, metres; chosen from the scene if `None`.
+    pub element_size: Option<f64>,
+    /// M: rays per element.
+    pub rays: usize,
+    /// Shadow rays per element and light. Their noise averages out over the elements that a receiver sees, a bias
+    /// would not: so no pilot decides here, as its stopping rule would take half of every faint penumbra away.
+    pub shadowing: Shadowing,
+    /// When the solver stops.
+    pub solver: Params,
+    /// Largest size of the table of hit ids, bytes.
+    pub memory: usize,
+}
+
+impl Default for SolveOptions {
+    fn default() -> Self {
+        SolveOptions {
+            element_size: None,
+            rays: 64,
+            shadowing: Shadowing { pilot: 8, mixed: 8 },
+            solver: Params { tolerance: 1e-5, max_steps: 500 },
+            memory: 4 << 30,
+        }
+    }
+}
+
+/// Where the light goes, in lumens (or watts) per band.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Balance {
+    /// Emitted by surfaces.
+    pub emitted: Bands,
+    /// Received from lights without area.
+    pub from_point_lights: Bands,
+    /// Received from the sky.
+    pub from_sky: Bands,
+    /// Absorbed by surfaces.
+    pub absorbed: Bands,
+    /// Escaped from the scene.
+    pub escaped: Bands,
+    /// Absorbed by the black backs of one-sided surfaces.
+    pub lost_on_backs: Bands,
+    /// (in − out)/in, before any repair.
+    pub defect: [f64; 3],
+}
+
+/// A solved scene.
+pub struct Solution<'a> {
+    tracer: &'a Tracer<'a>,
+    /// The elements.
+    pub elements: Elements,
+    /// What of them is exposed.
+    pub exposure: Exposure,
+    /// The lights that are evaluated directly.
+    pub luminaires: Luminaires,
+    /// Direct irradiance by light and element, lux per band.
+    pub columns: Vec<Vec<Bands>>,
+    /// Area of each element, m².
+    pub area: Vec<f64>,
+    /// Reflectance of each element.
+    pub reflectance: Vec<Bands>,
+    /// Emitted exitance of each element, lm/m² per band.
+    pub exitance: Vec<Bands>,
+    /// Residual, bound and steps of the last solve.
+    pub info: Info,
+    /// Time by stage.
+    pub stages: Stages,
+    /// Width of an element, metres.
+    pub element_size: f64,
+    sky: SkyPatches,
+    table: HitTable,
+    options: SolveOptions,
+    /// X by id: reflected and not directly carried radiosity of elements, then the sky's, then nothing.
+    values: Vec<[f32; 4]>,
+    irradiance: Vec<Bands>,
+    indirect: Vec<Bands>,
+}
+
+impl<'a> Solution<'a> {
+    /// Cuts the scene into elements, traces their rays and solves.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] before anything large is allocated; [`Error::Stopped`]; [`Error::Solve`].
+    pub fn new(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
+        let (scene, mesh) = (tracer.scene, tracer.mesh);
+        if mesh.triangles.is_empty() {
+            return Err(Error::Empty("the scene has no surface"));
+        }
+        let stages = Stages::default();
+        let total: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+        let element_size = options.element_size.unwrap_or_else(|| (2.0 * total / AUTOMATIC_ELEMENTS).sqrt());
+        let needed = HitTable::bytes(Elements::count(scene, mesh, element_size), options.rays);
+        if needed > options.memory {
+            let megabytes = |bytes: usize| bytes.div_ceil(1 << 20);
+            return Err(Error::Memory {
+                elements: Elements::count(scene, mesh, element_size),
+                rays: options.rays,
+                needed: megabytes(needed),
+                allowed: megabytes(options.memory),
+            });
+        }
+        let watch = Watch(monitor);
+        let elements = stages.time(monitor, "elements", || Elements::new(scene, mesh, element_size));
+        let ids = 0..elements.len() as u32;
+        let area: Vec<f64> = ids.clone().into_par_iter().map(|e| elements.area(mesh, e)).collect();
+        let (reflectance, exitance): (Vec<Bands>, Vec<Bands>) =
+            ids.into_par_iter().map(|e| elements.optics(scene, mesh, e)).unzip();
+        let exposure = stages.time(monitor, "exposure", || Exposure::new(tracer, mesh, &elements, &watch))?;
+        let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
+        let sky = SkyPatches::new(&scene.sky, scene.up.direction());
+
+        let receivers = ElementReceivers { mesh, elements: &elements, exposure: &exposure };
+        let columns = stages.time(monitor, "direct light", || {
+            (0..luminaires.lights.len())
+                .map(|light| {
+                    let column = luminaires.column(light, tracer, &receivers, &options.shadowing, &watch)?;
+                    Ok(column.into_iter().map(|(e, _)| e).collect())
+                })
+                .collect::<Result<Vec<Vec<Bands>>, radiosity_transport::Stopped>>()
+        })?;
+
+        let id_space = IdSpace { elements: &elements, sky };
+        let table = HitTable::new(area.clone(), &id_space);
+        let mut values = vec![[0f32; 4]; id_space.len()];
+        for (value, l) in values[elements.len()..].iter_mut().zip(sky.radiosity(&scene.sky)) {
+            value[..3].copy_from_slice(&l);
+        }
+        let n = elements.len();
+        let mut solution = Solution {
+            tracer,
+            elements,
+            exposure,
+            luminaires,
+            columns,
+            area,
+            reflectance,
+            exitance,
+            info: Info::default(),
+            stages,
+            element_size,
+            sky,
+            table,
+            options: *options,
+            values,
+            irradiance: vec![[0.0; 3]; n],
+            indirect: vec![[0.0; 3]; n],
+        };
+        solution.refine(options.rays, monitor)?;
+        Ok(solution)
+    }
+
+    /// The tracer that the solution was made with.
+    pub fn tracer(&self) -> &'a Tracer<'a> {
+        self.tracer
+    }
+
+    /// M: rays per element.
+    pub fn rays(&self) -> usize {
+        self.table.columns()
+    }
+
+    /// Appends rays up to `rays` per element and solves again from the solution so far.
+    ///
+    /// # Errors
+    /// As [`Solution::new`].
+    pub fn refine(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
+        let needed = HitTable::bytes(self.elements.len(), rays);
+        if needed > self.options.memory {
+            return Err(Error::Memory {
+                elements: self.elements.len(),
+                rays,
+                needed: needed.div_ceil(1 << 20),
+                allowed: self.options.memory.div_ceil(1 << 20),
+            });
+        }
+        let watch = Watch(monitor);
+        let mesh = self.tracer.mesh;
+        let ids = IdSpace { elements: &self.elements, sky: self.sky };
+        let receivers = ElementReceivers { mesh, elements: &self.elements, exposure: &self.exposure };
+        let table = &mut self.table;
+        self.stages.time(monitor, "rays", || table.extend(self.tracer, &ids, &receivers, rays, &watch))?;
+        let started = std::time::Instant::now();
+        monitor.stage("solve");
+        self.solve(monitor)?;
+        self.stages.add("solve", started.elapsed().as_secs_f64());
+        Ok(())
+    }
+
+    fn solve(&mut self, monitor: &dyn Monitor) -> Result<(), Error> {
+        let n = self.elements.len();
+        // The known part: direct light and what the sky gives through the rows.
+        let mut sky_only = self.values.clone();
+        sky_only[..n].fill([0.0; 4]);
+        let known: Vec<Bands> = if self.tracer.scene.sky.is_black() {
+            vec![[0.0; 3]; n]
+        } else {
+            self.table.rows_mean(&sky_only).into_iter().map(|h| [h[0], h[1], h[2]]).collect()
+        };
+        let direct = self.direct();
+        let mut e = vec![0.0; 3 * n];
+        for i in 0..n {
+            for band in 0..3 {
+                let own = f64::from(self.exitance[i][band] - self.luminaires.promoted[i][band]);
+                let arriving = f64::from(direct[i][band]) + f64::from(known[i][band]);
+                e[3 * i + band] = own + f64::from(self.reflectance[i][band]) * arriving;
+            }
+        }
+        let reflectance = self.reflectance.iter().flatten().map(|r| f64::from(*r)).collect();
+        let response = DiffuseResponse { reflectance, bands: 3, reciprocal_area: None };
+        let mut x: Vec<f64> = if self.info.steps > 0 {
+            self.values[..n].iter().flat_map(|v| v[..3].iter().map(|v| f64::from(*v))).collect()
+        } else {
+            e.clone()
+        };
+        // Rows keep their values in single precision: asking for more than they can tell would never end.
+        let params = Params { tolerance: self.options.solver.tolerance.max(1e-6), ..self.options.solver };
+        self.info = jacobi(&self.table, &response, &e, &mut x, &params, |_, info| {
+            let go = monitor.step(info.steps, info.steps + 1);
+            if go { Go::On } else { Go::Stop }
+        })
+        .map_err(|error| match error {
+            radiosity_solve::SolveError::Stopped => Error::Stopped,
+            other => Error::Solve(other),
+        })?;
+
+        for (value, x) in self.values.iter_mut().zip(x.chunks_exact(3)) {
+            *value = [x[0] as f32, x[1] as f32, x[2] as f32, 0.0];
+        }
+        let gathered = self.table.rows_mean(&self.values);
+        for i in 0..n {
+            for band in 0..3 {
+                self.indirect[i][band] = gathered[i][band];
+                self.irradiance[i][band] = direct[i][band] + gathered[i][band];
+            }
+        }
+        Ok(())
+    }
+
+    /// Direct irradiance of all lights together, by element.
+    pub fn direct(&self) -> Vec<Bands> {
+        let mut sum = vec![[0f32; 3]; self.elements.len()];
+        for column in &self.columns {
+            for (sum, e) in sum.iter_mut().zip(column) {
+                (0..3).for_each(|band| sum[band] += e[band]);
+            }
+        }
+        sum
+    }
+
+    /// Irradiance of each element, lux per band.
+    pub fn irradiance(&self) -> &[Bands] {
+        &self.irradiance
+    }
+
+    /// The part of the irradiance that came through the rows: reflected light, sky, large faint emitters.
+    pub fn indirect(&self) -> &[Bands] {
+        &self.indirect
+    }
+
+    /// Radiosity B = E + ρ H of each element, lm/m² per band.
+    pub fn radiosity(&self) -> Vec<Bands> {
+        (0..self.elements.len())
+            .map(|i| {
+                std::array::from_fn(|band| {
+                    self.exitance[i][band] + self.reflectance[i][band] * self.irradiance[i][band]
+                })
+            })
+            .collect()
+    }
+
+    /// The solution as a final gather reads it.
+    pub fn gather(&self) -> Gather<'_> {
+        Gather {
+            tracer: self.tracer,
+            ids: IdSpace { elements: &self.elements, sky: self.sky },
+            values: &self.values,
+            luminaires: &self.luminaires,
+            columns: &self.columns,
+            area: &self.area,
+        }
+    }
+
+    /// Exposed area of each element, m²; zero where it is buried.
+    pub fn exposed_area(&self) -> Vec<f64> {
+        let exposed = |e: usize| if self.exposure.is_buried(e as u32) { 0.0 } else { self.area[e] };
+        (0..self.elements.len()).map(exposed).collect()
+    }
+
+    /// Area-weighted relative standard error of the irradiance that comes from the rows' sampling, by the difference
+    /// of their two independent halves.
+    pub fn row_error(&self) -> f64 {
+        let halves = self.table.halves(&self.values);
+        let weight = self.exposed_area();
+        let (mut noise, mut signal) = (0.0, 0.0);
+        for (i, [a, b]) in halves.iter().enumerate() {
+            let y = |v: &[f32; 4]| f64::from(radiosity_scene::luminance([v[0], v[1], v[2]]));
+            let e = f64::from(radiosity_scene::luminance(self.irradiance[i]));
+            noise += weight[i] * (0.5 * (y(a) - y(b))).powi(2);
+            signal += weight[i] * e * e;
+        }
+        (noise / signal.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    /// Where the light goes, from the rows as they are.
+    pub fn balance(&self) -> Balance {
+        let n = self.elements.len();
+        let (first_sky, nothing) = (n as u32, (self.values.len() - 1) as u32);
+        let radiosity = self.radiosity();
+        let m = self.table.columns() as f64;
+        let mut sums = [[0f64; 3]; 6];
+        let weight = self.exposed_area();
+        let point_lights = self
+            .luminaires
+            .lights
+            .iter()
+            .zip(&self.columns)
+            .filter(|(light, _)| matches!(light, radiosity_transport::Light::Point(_)));
+        for (_, column) in point_lights {
+            for (e, w) in column.iter().zip(&weight) {
+                (0..3).for_each(|band| sums[1][band] += w * f64::from(e[band]));
+            }
+        }
+        let shares: Vec<[f64; 2]> = (0..n)
+            .into_par_iter()
+            .map(|i| {
+                let (mut sky, mut back) = (0u32, 0u32);
+                for id in self.table.row_ids(i) {
+                    back += u32::from(id == nothing);
+                    sky += u32::from(id >= first_sky && id != nothing);
+                }
+                [f64::from(sky) / m, f64::from(back) / m]
+            })
+            .collect();
+        let mut sky_only = self.values.clone();
+        sky_only[..n].fill([0.0; 4]);
+        let from_sky = self.table.rows_mean(&sky_only);
+        for i in 0..n {
+            for band in 0..3 {
+                let (rho, e) = (f64::from(self.reflectance[i][band]), f64::from(self.irradiance[i][band]));
+                let b = f64::from(radiosity[i][band]);
+                sums[0][band] += weight[i] * f64::from(self.exitance[i][band]);
+                sums[2][band] += weight[i] * f64::from(from_sky[i][band]);
+                sums[3][band] += weight[i] * (1.0 - rho) * e;
+                sums[4][band] += weight[i] * b * shares[i][0];
+                sums[5][band] += weight[i] * b * shares[i][1];
+            }
+        }
+        let defect = std::array::from_fn(|band| {
+            let input = sums[0][band] + sums[1][band] + sums[2][band];
+            let output = sums[3][band] + sums[4][band] + sums[5][band];
+            if input > 0.0 { (input - output) / input } else { 0.0 }
+        });
+        let [emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs] =
+            sums.map(|s| s.map(|x| x as f32));
+        Balance { emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs, defect }
+    }
+}

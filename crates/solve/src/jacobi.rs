@@ -1,0 +1,69 @@
+//! Jacobi iteration with the constant deflated: B ← E + R F B, then the energy balance set right at once.
+//!
+//! Plain Jacobi (gathering) loses one factor ρ per sweep, because one error mode, the constant irradiance, decays as
+//! slowly as ρ̄; all others die at about half that rate (a closed cube has eigenvalues 1, 0.51, …). After each sweep
+//! the multiple c of v = R 1 that makes the residual's area integral vanish is added: a coarse space of one vector
+//! (a two-level method; Nicolaides 1987). On a closed cube at ρ = 0.95 that takes 20 sweeps instead of 269.
+
+use crate::{Go, Info, Params, Response, SolveError, Space, Transport, bound, residual};
+
+/// Solves B = E + R F B in place; `b` holds the start (warm or zero) and the result. `step` sees each iterate.
+///
+/// # Errors
+/// [`SolveError::NotConverged`] with the last iterate left in `b`; [`SolveError::Stopped`] if `step` says so.
+pub fn jacobi<T: Transport>(
+    transport: &T,
+    response: &(impl Response + ?Sized),
+    e: &[f64],
+    b: &mut [f64],
+    params: &Params,
+    mut step: impl FnMut(&[f64], &Info) -> Go,
+) -> Result<Info, SolveError> {
+    let space = transport.space();
+    let bands = response.bands();
+    let n = b.len();
+    let (mut h, mut r) = (vec![0.0; n], vec![0.0; n]);
+    let ones = vec![1.0; n];
+
+    // The coarse vector v = R 1, its image under F, and the balance of v itself.
+    let (mut v, mut fv) = (vec![0.0; n], vec![0.0; n]);
+    response.respond(&ones, &mut v);
+    transport.apply(&v, &mut fv, bands);
+    response.respond(&fv, &mut r);
+    let kept: Vec<f64> = v.iter().zip(&r).map(|(v, rfv)| v - rfv).collect();
+    let balance_of_v = space.inner(&ones, &kept, bands);
+
+    transport.apply(b, &mut h, bands);
+    let mut info = Info { steps: 2, ..Info::default() };
+    loop {
+        info.residual = residual(space, response, (e, b, &h), &mut r);
+        info.bound = bound(response, &r);
+        if step(b, &info) == Go::Stop {
+            return Err(SolveError::Stopped);
+        }
+        if info.residual.iter().all(|x| *x <= params.tolerance) {
+            return Ok(info);
+        }
+        if info.steps >= params.max_steps {
+            return Err(SolveError::NotConverged { info, asked: params.tolerance });
+        }
+
+        // Sweep: B + r is E + R F B.
+        for (b, r) in b.iter_mut().zip(&r) {
+            *b += r;
+        }
+        transport.apply(b, &mut h, bands);
+        info.steps += 1;
+
+        // Deflate: the share of v that balances the area integral of the new residual. F is linear, so h follows.
+        residual(space, response, (e, b, &h), &mut r);
+        let balance = space.inner(&ones, &r, bands);
+        for band in 0..bands {
+            let c = if balance_of_v[band] > 0.0 { balance[band] / balance_of_v[band] } else { 0.0 };
+            for i in (band..n).step_by(bands) {
+                b[i] += c * v[i];
+                h[i] += c * fv[i];
+            }
+        }
+    }
+}

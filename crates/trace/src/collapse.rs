@@ -1,0 +1,145 @@
+//! From the binary tree to the wide one, at the least expected cost of a ray.
+//!
+//! Ylitie, Karras & Laine 2017, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", section 3:
+//! C(n, i) is the least cost of the subtree n when it may hang as up to i children on the node above it.
+//! C(n, 1) = min(leaf, area × [`NODE`] + the best way to fill eight children); C(n, i) = min over k of
+//! C(left, k) + C(right, i − k), or C(n, i − 1). All are worked out bottom up while the binary tree is built;
+//! [`collapse`] then follows the choices top down.
+
+use crate::build::{Binary, Item};
+use crate::tree::{Block, Child, LANES, MAX_BLOCKS, Node, WIDTH};
+use glam::Vec3;
+
+/// Cost of testing the eight boxes of a node, and of putting those hit in order.
+const NODE: f32 = 1.0;
+
+/// Cost of testing a block of four triangles. Where it is 0.6 rays in a furnished room visit 2 % fewer nodes and 9 %
+/// more blocks, at 1.5 it is 2 % more and 12 % fewer: anywhere in between will do.
+const BLOCK: f32 = 0.8;
+
+/// How a subtree hangs below its parent: the costs C(n, 1..=7) and what attains them.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Choice {
+    cost: [f32; WIDTH - 1],
+    /// `[0]`: children given to the left side when this is a node of its own, 0 where it is a leaf.
+    /// `[i - 1]`: children out of i given to the left side, 0 where i − 1 do as well.
+    left: [u8; WIDTH - 1],
+}
+
+/// Fills in the choice of a node, given those of its children.
+pub(crate) fn choose(mut node: Binary, area: f32, children: Option<[&Choice; 2]>) -> Binary {
+    let blocks = (node.count as usize).div_ceil(LANES);
+    let leaf = if blocks <= MAX_BLOCKS { area * BLOCK * blocks as f32 } else { f32::INFINITY };
+    let choice = &mut node.choice;
+    let Some([l, r]) = children else {
+        choice.cost = [leaf; WIDTH - 1];
+        return node;
+    };
+
+    // The cheapest way to hand i children to the two sides; costs that are not finite still leave a valid choice.
+    let share = |i: usize| {
+        let mut best = (f32::INFINITY, 1);
+        for k in 1..i {
+            if k < WIDTH && i - k < WIDTH {
+                let cost = l.cost[k - 1] + r.cost[i - k - 1];
+                if cost < best.0 {
+                    best = (cost, k as u8);
+                }
+            }
+        }
+        best
+    };
+    let (below, k) = share(WIDTH);
+    let inner = below + area * NODE;
+    (choice.cost[0], choice.left[0]) = if blocks <= MAX_BLOCKS && leaf <= inner { (leaf, 0) } else { (inner, k) };
+    for i in 2..WIDTH {
+        let (cost, k) = share(i);
+        (choice.cost[i - 1], choice.left[i - 1]) =
+            if cost < choice.cost[i - 2] { (cost, k) } else { (choice.cost[i - 2], 0) };
+    }
+    node
+}
+
+/// Makes the wide tree from the binary one. The first node is the root; without triangles there is none.
+pub(crate) fn collapse(binary: &[Binary], items: &[Item], triangles: &[[Vec3; 3]]) -> (Vec<Node>, Vec<Block>) {
+    let mut wide = Wide { binary, items, triangles, nodes: Vec::new(), blocks: Vec::new() };
+    if !binary.is_empty() {
+        wide.nodes.push(Node::EMPTY);
+        if binary[0].choice.left[0] == 0 {
+            // A tree of one leaf still gets a node above it.
+            wide.fill(0, &[(0, 0)]);
+        } else {
+            let mut children = Vec::with_capacity(WIDTH);
+            wide.open(0, 0, WIDTH, &mut children);
+            wide.fill(0, &children);
+        }
+    }
+    (wide.nodes, wide.blocks)
+}
+
+struct Wide<'a> {
+    binary: &'a [Binary],
+    items: &'a [Item],
+    triangles: &'a [[Vec3; 3]],
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+}
+
+impl Wide<'_> {
+    /// Lists what hangs on the wide node above when the binary node at `at`, whose items start at `first`, is
+    /// opened and may take `slots` places.
+    fn open(&self, at: usize, first: usize, slots: usize, children: &mut Vec<(usize, usize)>) {
+        let node = &self.binary[at];
+        let left = node.left as usize;
+        let k = node.choice.left[if slots == WIDTH { 0 } else { slots - 1 }] as usize;
+        for (at, first, slots) in [(at + 1, first, k), (at + 2 * left, first + left, slots - k)] {
+            // Where fewer slots cost as much, fewer are taken; with one left the subtree stays closed.
+            let slots = (2..=slots).rev().find(|&i| self.binary[at].choice.left[i - 1] != 0);
+            match slots {
+                Some(slots) => self.open(at, first, slots, children),
+                None => children.push((at, first)),
+            }
+        }
+    }
+
+    /// Fills a wide node. Its inner children come to lie next to each other; everything below them follows in order.
+    fn fill(&mut self, index: usize, children: &[(usize, usize)]) {
+        let mut node = Node::EMPTY;
+        let mut below = Vec::new();
+        for (slot, &(at, first)) in children.iter().enumerate() {
+            let binary = &self.binary[at];
+            for axis in 0..3 {
+                node.bounds[axis][slot] = binary.lo[axis];
+                node.bounds[axis + 3][slot] = binary.hi[axis];
+            }
+            node.child[slot] = if binary.choice.left[0] == 0 {
+                self.leaf(&self.items[first..first + binary.count as usize])
+            } else {
+                self.nodes.push(Node::EMPTY);
+                below.push((self.nodes.len() - 1, at, first));
+                Child::node(self.nodes.len() - 1)
+            };
+        }
+        self.nodes[index] = node;
+        for (index, at, first) in below {
+            let mut children = Vec::with_capacity(WIDTH);
+            self.open(at, first, WIDTH, &mut children);
+            self.fill(index, &children);
+        }
+    }
+
+    fn leaf(&mut self, items: &[Item]) -> Child {
+        let first = self.blocks.len();
+        // In the order of their indices, so that equal input gives equal leaves however it was sorted.
+        let mut indices: Vec<u32> = items.iter().map(Item::triangle).collect();
+        indices.sort_unstable();
+        for four in indices.chunks(LANES) {
+            let mut block = Block::EMPTY;
+            for (lane, &triangle) in four.iter().enumerate() {
+                block.set(lane, triangle, &self.triangles[triangle as usize]);
+            }
+            self.blocks.push(block);
+        }
+        Child::leaf(first, self.blocks.len() - first)
+    }
+}

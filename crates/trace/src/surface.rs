@@ -1,0 +1,196 @@
+//! Rays in, surfaces out: the tree of boxes together with what the scene says of its triangles.
+//!
+//! A ray sees the front of every surface, the back of double-sided ones, passes cut-out parts and, with probability
+//! 1 − α, blended ones. The back of a one-sided surface stops the ray and is black: light must not enter a room
+//! through the outside of its walls. Ray origins are moved off their surface by a few units in the last place of the
+//! scene's coordinates, which is all the bias there is.
+
+use crate::sampling::{hash, unit};
+use crate::{Hit, Ray, Tree};
+use glam::{DVec2, DVec3, Vec3};
+use radiosity_scene::{AlphaMode, Mesh, Scene, Side};
+
+/// What a ray met first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Found {
+    /// A surface that takes part in the exchange of light.
+    Surface {
+        /// Mesh triangle.
+        triangle: u32,
+        /// Barycentric coordinates of its corners 1 and 2.
+        uv: [f32; 2],
+        /// The side that was hit.
+        side: Side,
+        /// Distance, metres.
+        distance: f32,
+    },
+    /// The back of a one-sided surface: black.
+    Back,
+    /// Nothing: the ray left the scene.
+    Escaped,
+}
+
+/// A place that rays start from or end at: a point with the unit normal of the side that is meant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// World position.
+    pub point: DVec3,
+    /// Unit normal; rays leave into its half space.
+    pub normal: DVec3,
+    /// Mesh triangle that the point lies on, `u32::MAX` if none is known.
+    pub triangle: u32,
+}
+
+/// Who sees whom in one scene.
+pub struct Tracer<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its welded triangles, which hits refer to.
+    pub mesh: &'a Mesh,
+    tree: Tree,
+    centre: DVec3,
+    offset: f64,
+    /// Per triangle, whether it is more than an opaque one-sided surface.
+    kind: Vec<Kind>,
+    all_opaque: bool,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+struct Kind {
+    double_sided: bool,
+    see_through: bool,
+}
+
+impl<'a> Tracer<'a> {
+    /// Builds the tree of boxes over a mesh.
+    pub fn new(scene: &'a Scene, mesh: &'a Mesh) -> Tracer<'a> {
+        let (mut low, mut high) = (DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY));
+        for &v in &mesh.vertices {
+            (low, high) = (low.min(v), high.max(v));
+        }
+        // Around the origin single precision is finest, so the tree lives in coordinates about the scene's centre.
+        let centre = if mesh.vertices.is_empty() { DVec3::ZERO } else { 0.5 * (low + high) };
+        let half = if mesh.vertices.is_empty() { 1.0 } else { (0.5 * (high - low)).max_element() };
+        let corners: Vec<[Vec3; 3]> =
+            (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| (p - centre).as_vec3())).collect();
+        let kind: Vec<Kind> = mesh
+            .source
+            .iter()
+            .map(|&source| {
+                let material = scene.material(source as usize);
+                let see_through = match material.alpha_mode {
+                    AlphaMode::Opaque => false,
+                    AlphaMode::Mask { .. } | AlphaMode::Blend => {
+                        material.base_color[3] < 1.0
+                            || !scene.colors.is_empty()
+                            || material.base_color_texture.is_some_and(|t| !scene.textures[t.texture].is_opaque())
+                    }
+                };
+                Kind { double_sided: material.double_sided, see_through }
+            })
+            .collect();
+        Tracer {
+            scene,
+            mesh,
+            tree: Tree::new(&corners),
+            centre,
+            // Rounding a coordinate to single precision moves it by at most 2^-25 of its binade; interpolation and
+            // the intersection test add about as much again. Eight times that clears the surface with certainty and
+            // is still a few micrometres in a room.
+            offset: half * 2f64.powi(-21),
+            all_opaque: kind.iter().all(|k| !k.see_through),
+            kind,
+        }
+    }
+
+    /// The tree of boxes (its coordinates are relative to the scene's centre).
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// The distance by which origins are moved off their surface, metres.
+    pub fn offset(&self) -> f64 {
+        self.offset
+    }
+
+    /// The ray that leaves a place in a direction and ends after `length` metres.
+    #[inline]
+    pub fn ray(&self, from: &Place, direction: DVec3, length: f64) -> Ray {
+        let origin = from.point - self.centre + self.offset * from.normal;
+        Ray { origin: origin.as_vec3(), direction: direction.as_vec3(), t_max: length as f32, skip: from.triangle }
+    }
+
+    /// A ray that does not start on a surface: a camera's.
+    pub fn free_ray(&self, from: DVec3, direction: DVec3) -> Ray {
+        let origin = (from - self.centre).as_vec3();
+        Ray { origin, direction: direction.as_vec3(), t_max: f32::INFINITY, skip: u32::MAX }
+    }
+
+    /// The first surface along a ray. `seed` decides, ray by ray, whether a blended surface stops it.
+    #[inline]
+    pub fn first(&self, ray: &Ray, seed: u32) -> Found {
+        let hit = if self.all_opaque {
+            self.tree.closest(ray)
+        } else {
+            self.tree.closest_where(ray, |t, u, v, _| self.stops(t, u, v, seed))
+        };
+        self.found(hit)
+    }
+
+    /// The first surface that a viewer sees: backs of one-sided surfaces are passed, as viewers cull them.
+    pub fn seen(&self, ray: &Ray, seed: u32) -> Found {
+        self.found(self.tree.closest_where(ray, |t, u, v, back| {
+            (!back || self.kind[t as usize].double_sided) && self.stops(t, u, v, seed)
+        }))
+    }
+
+    /// Whether anything stops a ray before its end.
+    #[inline]
+    pub fn blocked(&self, ray: &Ray, seed: u32) -> bool {
+        if self.all_opaque {
+            self.tree.blocked(ray)
+        } else {
+            self.tree.blocked_where(ray, |t, u, v, _| self.stops(t, u, v, seed))
+        }
+    }
+
+    /// Whether two places see each other. The far end is moved off its surface like the near one, so that neither
+    /// blocks the ray between them.
+    #[inline]
+    pub fn mutually_visible(&self, from: &Place, to: &Place, seed: u32) -> bool {
+        let origin = from.point + self.offset * from.normal;
+        let target = to.point + self.offset * to.normal;
+        let along = target - origin;
+        let length = along.length();
+        if length <= self.offset {
+            return true;
+        }
+        let mut ray = self.ray(from, along / length, length);
+        if ray.skip == u32::MAX {
+            ray.skip = to.triangle;
+        }
+        !self.blocked(&ray, seed)
+    }
+
+    fn found(&self, hit: Option<Hit>) -> Found {
+        match hit {
+            None => Found::Escaped,
+            Some(hit) if hit.back && !self.kind[hit.triangle as usize].double_sided => Found::Back,
+            Some(hit) => Found::Surface {
+                triangle: hit.triangle,
+                uv: [hit.u, hit.v],
+                side: if hit.back { Side::Back } else { Side::Front },
+                distance: hit.t,
+            },
+        }
+    }
+
+    fn stops(&self, triangle: u32, u: f32, v: f32, seed: u32) -> bool {
+        if !self.kind[triangle as usize].see_through {
+            return true;
+        }
+        let at = self.mesh.surface(triangle as usize, DVec2::new(f64::from(u), f64::from(v)));
+        let opacity = self.scene.opacity(at);
+        opacity >= 1.0 || (opacity > 0.0 && unit(hash(seed ^ hash(triangle))) < opacity)
+    }
+}

@@ -1,0 +1,148 @@
+//! What of each element is exposed, and what is buried: under a box that stands on the floor, inside a wall that
+//! another wall runs into.
+//!
+//! A place is buried when (nearly) all it sees is backs of one-sided surfaces. Radiosity of an element is meant as the
+//! mean over its exposed part, since only that part is ever seen; averaging in the buried part would darken the seams
+//! along every contact (the "shadow leaks" of lightmap bakers). A pilot finds elements that see backs at all; those are
+//! examined on an 8 × 8 grid, which keeps most samples out of the buried part; [`is_buried`] decides the rest.
+
+use radiosity_scene::{Elements, Mesh};
+use radiosity_trace::sampling::{Sequence, cosine_direction, frame};
+use radiosity_trace::{Found, Place, Tracer};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use crate::{Progress, Stopped};
+
+/// Rays of the pilot per element. A strip of 1/16 of an element that is buried may go unnoticed, and then darkens
+/// the element by as much.
+const PILOT: u32 = 16;
+
+/// Rays that examine one place.
+const PROBE: u32 = 8;
+
+/// A place is buried when at least this many of its probe rays meet backs. One of eight may slip through a gap
+/// between solids that touch.
+const BURIED: u32 = 7;
+
+/// Whether a place is buried in a solid. To be asked where a ray has met a back already; exposed places answer after
+/// two or three rays.
+pub fn is_buried(tracer: &Tracer, place: &Place, seed: u32) -> bool {
+    let frame = frame(place.normal);
+    let sequence = Sequence::new(seed, 0x0b0b);
+    let mut missed = 0;
+    for i in 0..PROBE {
+        let [u, v, _, _] = sequence.point(i);
+        let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+        missed += u32::from(tracer.first(&tracer.ray(place, direction, f64::INFINITY), seed ^ i) != Found::Back);
+        if missed > PROBE - BURIED {
+            return false;
+        }
+    }
+    true
+}
+
+/// For each element, the exposed places among 8 × 8; whole elements need no entry.
+#[derive(Clone, Debug, Default)]
+pub struct Exposure {
+    masks: FxHashMap<u32, u64>,
+    /// Number of elements that are buried entirely.
+    pub buried: usize,
+    /// Number of elements that are buried in part.
+    pub partial: usize,
+}
+
+impl Exposure {
+    /// Examines all elements.
+    ///
+    /// # Errors
+    /// [`Stopped`] if `progress` says so.
+    pub fn new(
+        tracer: &Tracer,
+        mesh: &Mesh,
+        elements: &Elements,
+        progress: &impl Progress,
+    ) -> Result<Exposure, Stopped> {
+        const CHUNK: usize = 1024;
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let n = elements.len();
+        let chunks: Vec<Vec<(u32, u64)>> = (0..n.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|chunk| {
+                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(n);
+                let masks = range.clone().filter_map(|i| examine(tracer, mesh, elements, i as u32));
+                let masks: Vec<_> = masks.map(|(i, mask)| (i, mask)).collect();
+                let so_far = done.fetch_add(range.len(), std::sync::atomic::Ordering::Relaxed) + range.len();
+                progress.step(so_far, n).then_some(masks).ok_or(Stopped)
+            })
+            .collect::<Result<_, _>>()?;
+        let masks: FxHashMap<u32, u64> = chunks.into_iter().flatten().collect();
+        let buried = masks.values().filter(|m| **m == 0).count();
+        Ok(Exposure { buried, partial: masks.len() - buried, masks })
+    }
+
+    /// Whether nothing of an element is exposed.
+    pub fn is_buried(&self, element: u32) -> bool {
+        self.masks.get(&element) == Some(&0)
+    }
+
+    /// Moves a point of the unit square into the exposed part of an element; `None` if there is none.
+    #[inline]
+    pub fn place(&self, element: u32, x: f32, y: f32) -> Option<(f64, f64)> {
+        if !self.masks.is_empty()
+            && let Some(&mask) = self.masks.get(&element)
+        {
+            let open = mask.count_ones();
+            if open == 0 {
+                return None;
+            }
+            // x picks one of the exposed cells and, stretched, the place within it.
+            let scaled = f64::from(x) * f64::from(open);
+            let pick = (scaled as u32).min(open - 1);
+            let cell = nth_bit(mask, pick);
+            let within = (scaled - f64::from(pick)).clamp(0.0, 1.0);
+            return Some((f64::from(cell % 8) / 8.0 + within / 8.0, f64::from(cell / 8) / 8.0 + f64::from(y) / 8.0));
+        }
+        Some((f64::from(x), f64::from(y)))
+    }
+}
+
+/// Number of the n-th set bit.
+fn nth_bit(mut mask: u64, n: u32) -> u32 {
+    for _ in 0..n {
+        mask &= mask - 1;
+    }
+    mask.trailing_zeros()
+}
+
+/// The mask of an element, if it is not wholly exposed.
+fn examine(tracer: &Tracer, mesh: &Mesh, elements: &Elements, element: u32) -> Option<(u32, u64)> {
+    let (triangle, _) = elements.place(element);
+    let normal = elements.normal(mesh, element);
+    let frame = frame(normal);
+    let sequence = Sequence::new(element, 0x0e59);
+    let back = |x: f64, y: f64, u: f32, v: f32, seed: u32| {
+        let point = mesh.point(triangle, elements.sample(element, x, y));
+        let place = Place { point, normal, triangle: triangle as u32 };
+        let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+        tracer.first(&tracer.ray(&place, direction, f64::INFINITY), seed) == Found::Back
+    };
+    let pilot = (0..PILOT)
+        .filter(|&i| {
+            let [u, v, x, y] = sequence.point(i);
+            back(f64::from(x), f64::from(y), u, v, i)
+        })
+        .count();
+    if pilot == 0 {
+        return None;
+    }
+    let mut mask = 0u64;
+    for cell in 0..64 {
+        let [dx, dy, _, _] = sequence.point(PILOT + cell);
+        let (x, y) = ((f64::from(cell % 8) + f64::from(dx)) / 8.0, (f64::from(cell / 8) + f64::from(dy)) / 8.0);
+        let point = mesh.point(triangle, elements.sample(element, x, y));
+        let place = Place { point, normal, triangle: triangle as u32 };
+        mask |= u64::from(!is_buried(tracer, &place, element ^ cell << 24)) << cell;
+    }
+    (mask != u64::MAX).then_some((element, mask))
+}

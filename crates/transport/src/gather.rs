@@ -1,0 +1,163 @@
+//! The final gather: rows that start at a point, are used once and not kept (Reichert 1992; Smits 1994).
+//!
+//! A ray that meets a far element looks up its radiosity; errors of single elements average out over the rays. Where
+//! the element that is met is nearer than a few times its own width, its mean is a poor stand-in for the spot that is
+//! seen: there the ray goes on as a path — one light sample, one more ray — and so contacts, shelves and corners are
+//! resolved below the size of the elements.
+
+use crate::rows::IdSpace;
+use crate::{Luminaires, PointReceivers, Progress, Receivers, Shadowing, Stopped};
+use glam::{DVec2, DVec3};
+use radiosity_scene::{Bands, Side, luminance};
+use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
+use radiosity_trace::{Found, Place, Tracer};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Elements nearer than this many of their own widths are resolved, not looked up.
+const NEAR: f32 = 3.0;
+
+/// Bounces after which even near elements are looked up.
+const DEEPEST: u32 = 4;
+
+/// Share of light samples that ignore what the element itself received, so that no light is ever missed.
+const UNGUIDED: f64 = 0.2;
+
+/// The stream of sample points that gathers use.
+const GATHER: u32 = 0x0200;
+
+/// A solution, as a gather reads it.
+pub struct Gather<'a> {
+    /// Who sees whom.
+    pub tracer: &'a Tracer<'a>,
+    /// The ids.
+    pub ids: IdSpace<'a>,
+    /// X by id: radiosity that is not carried by luminaires.
+    pub values: &'a [[f32; 4]],
+    /// The luminaires.
+    pub luminaires: &'a Luminaires,
+    /// Direct irradiance by light and element.
+    pub columns: &'a [Vec<Bands>],
+    /// Area by element, m².
+    pub area: &'a [f64],
+}
+
+impl Gather<'_> {
+    /// Mean incoming radiosity at each receiver over `rays` rays, as two independent halves: its indirect irradiance.
+    ///
+    /// # Errors
+    /// [`Stopped`] if `progress` says so.
+    pub fn irradiance(
+        &self,
+        receivers: &impl Receivers,
+        rays: usize,
+        progress: &impl Progress,
+    ) -> Result<Vec<[Bands; 2]>, Stopped> {
+        const CHUNK: usize = 64;
+        let n = receivers.len();
+        let half_rays = rays.div_ceil(2).max(1) as u32;
+        let done = AtomicUsize::new(0);
+        let mut means = vec![[[0f32; 3]; 2]; n];
+        means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
+            for (k, mean) in means.iter_mut().enumerate() {
+                let i = chunk * CHUNK + k;
+                let seed = receivers.seed(i);
+                for half in 0..2 {
+                    let sequence = Sequence::new(seed, GATHER + half);
+                    let mut sum = [0f64; 3];
+                    for index in 0..half_rays {
+                        let [u, v, x, y] = sequence.point(index);
+                        let Some(place) = receivers.place(i, x, y) else { continue };
+                        let direction = cosine_direction(&frame(place.normal), f64::from(u), f64::from(v));
+                        let arriving = self.arriving(&place, direction, hash(seed ^ index << 1 ^ half));
+                        (0..3).for_each(|band| sum[band] += arriving[band]);
+                    }
+                    mean[half as usize] = sum.map(|s| (s / f64::from(half_rays)) as f32);
+                }
+            }
+            let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
+            progress.step(so_far, n).then_some(()).ok_or(Stopped)
+        })?;
+        Ok(means)
+    }
+
+    /// Radiosity that arrives at a place from a direction, without that of the luminaires.
+    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32) -> [f64; 3] {
+        let (mut place, mut direction) = (*from, direction);
+        let (mut sum, mut throughput) = ([0f64; 3], [1f64; 3]);
+        for bounce in 0.. {
+            let found = self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), seed);
+            let id = self.ids.id(found, direction);
+            let near = match found {
+                Found::Surface { triangle, uv, side, distance } if bounce < DEEPEST && id != self.ids.nothing() => {
+                    let width = (2.0 * self.area[id as usize]).sqrt() as f32;
+                    (distance < NEAR * width).then_some((triangle as usize, uv, side))
+                }
+                _ => None,
+            };
+            let Some((triangle, uv, side)) = near else {
+                let value = self.values[id as usize];
+                (0..3).for_each(|band| sum[band] += throughput[band] * f64::from(value[band]));
+                return sum;
+            };
+
+            // Go on as a path from the very spot.
+            let (scene, mesh) = (self.tracer.scene, self.tracer.mesh);
+            let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
+            let at = mesh.surface(triangle, uv);
+            let sign = if side == Side::Front { 1.0 } else { -1.0 };
+            let spot = Place {
+                point: mesh.point(triangle, uv),
+                normal: sign * mesh.normal(triangle),
+                triangle: triangle as u32,
+            };
+            let promoted = self.luminaires.promoted[id as usize];
+            if promoted[..3].iter().all(|p| *p == 0.0) {
+                let luminance = scene.emitted_luminance(at);
+                for band in 0..3 {
+                    sum[band] += throughput[band] * std::f64::consts::PI * f64::from(luminance[band]);
+                }
+            }
+            let reflectance = scene.reflectance(at);
+            (0..3).for_each(|band| throughput[band] *= f64::from(reflectance[band]));
+            if throughput.iter().all(|t| *t <= 0.0) {
+                return sum;
+            }
+            seed = hash(seed.wrapping_add(0x9e37_79b9));
+            let direct = self.one_light(&spot, id as usize, seed);
+            (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
+            let [u, v] = [hash(seed ^ 0x1), hash(seed ^ 0x2)].map(|h| f64::from(unit(h)));
+            direction = cosine_direction(&frame(spot.normal), u, v);
+            place = spot;
+        }
+        sum
+    }
+
+    /// Direct irradiance at a spot of an element, by one light picked after what the element received.
+    fn one_light(&self, spot: &Place, element: usize, seed: u32) -> [f64; 3] {
+        let lights = self.luminaires.lights.len();
+        if lights == 0 {
+            return [0.0; 3];
+        }
+        let received = |light: usize| f64::from(luminance(self.columns[light][element]));
+        let total: f64 = (0..lights).map(received).sum();
+        let even = 1.0 / lights as f64;
+        let probability = |light: usize| {
+            if total > 0.0 { (1.0 - UNGUIDED) * received(light) / total + UNGUIDED * even } else { even }
+        };
+        let mut rest = f64::from(unit(hash(seed ^ 0x3)));
+        let mut pick = lights - 1;
+        for light in 0..lights {
+            if rest < probability(light) {
+                pick = light;
+                break;
+            }
+            rest -= probability(light);
+        }
+        let receivers = PointReceivers { places: std::slice::from_ref(spot) };
+        let once = Shadowing { pilot: 1, mixed: 1 };
+        let (e, _) = self.luminaires.irradiance_seeded(pick, self.tracer, &receivers, 0, &once, hash(seed ^ 0x4));
+        let scale = 1.0 / probability(pick);
+        e.map(|e| f64::from(e) * scale)
+    }
+}

@@ -1,0 +1,243 @@
+//! The table of hit ids: F as it was found by rays.
+//!
+//! Receiver i sends M cosine-distributed rays (Malley 1988) from stratified points on itself; entry (i, m) is the id of
+//! what ray m met: an element, a sky patch, or nothing. Each entry weighs 1/M, so a row sums to exactly one and energy
+//! cannot appear. The rays of a row are two independently scrambled halves: half their difference is the standard
+//! error of the row, live and for any right-hand side. Doubling M appends columns to the table; nothing is traced
+//! twice. It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
+
+use crate::{Progress, Receivers, Stopped};
+use radiosity_scene::{Elements, SkyPatches};
+use radiosity_solve::{AreaSpace, Transport};
+use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
+use radiosity_trace::{Found, Tracer};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The one space of ids: surface elements, then sky patches, then nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct IdSpace<'a> {
+    /// The surface elements.
+    pub elements: &'a Elements,
+    /// The sky patches.
+    pub sky: SkyPatches,
+}
+
+impl IdSpace<'_> {
+    /// Number of ids.
+    pub fn len(&self) -> usize {
+        self.elements.len() + self.sky.len() + 1
+    }
+
+    /// Never: there is always "nothing".
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// The id of nothing: the back of a one-sided surface.
+    pub fn nothing(&self) -> u32 {
+        (self.len() - 1) as u32
+    }
+
+    /// The id of what a ray found.
+    #[inline]
+    pub fn id(&self, found: Found, direction: glam::DVec3) -> u32 {
+        match found {
+            Found::Surface { triangle, uv: [u, v], side, .. } => {
+                self.elements.at(triangle, u, v, side).unwrap_or(self.nothing())
+            }
+            Found::Back => self.nothing(),
+            Found::Escaped => (self.elements.len() + self.sky.at(direction)) as u32,
+        }
+    }
+}
+
+/// Places tried for a ray before its receiver counts as buried. Elements less than a tenth of which is exposed are
+/// known to the exposure mask, so each attempt succeeds with probability 1/2 or more.
+const ATTEMPTS: u32 = 8;
+
+/// Rays `from..to` of both halves of a receiver's row; `out` gets the ids of the first half, then of the second.
+fn trace_row(
+    tracer: &Tracer,
+    ids: &IdSpace,
+    receivers: &impl Receivers,
+    i: usize,
+    (from, to, stream): (u32, u32, u32),
+    mut out: impl FnMut(usize, u32),
+) {
+    let seed = receivers.seed(i);
+    let mut kept = None;
+    for half in 0..2 {
+        let sequence = Sequence::new(seed, stream + half);
+        for index in from..to {
+            let [u, v, mut x, mut y] = sequence.point(index);
+            let salt = hash(seed ^ index) ^ half;
+            let mut id = ids.nothing();
+            for attempt in 0..ATTEMPTS {
+                let Some(place) = receivers.place(i, x, y) else { break };
+                let frame = match kept {
+                    Some((normal, frame)) if normal == place.normal => frame,
+                    _ => frame(place.normal),
+                };
+                kept = Some((place.normal, frame));
+                let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+                let found = tracer.first(&tracer.ray(&place, direction, f64::INFINITY), salt);
+                id = ids.id(found, direction);
+                if found != Found::Back || !receivers.buried(tracer, &place, salt) {
+                    break;
+                }
+                // The place lies inside a solid: the same direction from another place of the receiver.
+                let again = hash(salt ^ attempt);
+                (x, y) = (unit(again), unit(hash(again)));
+            }
+            out(half as usize, id);
+        }
+    }
+}
+
+/// Rays of one block of columns: the ids of `width` rays per receiver, the first half of them from the first of the
+/// two independent sequences.
+#[derive(Clone, Debug)]
+struct Block {
+    width: usize,
+    ids: Vec<u32>,
+}
+
+/// The table of hit ids of all elements.
+#[derive(Clone, Debug)]
+pub struct HitTable {
+    space: AreaSpace,
+    blocks: Vec<Block>,
+    columns: usize,
+    all_ids: usize,
+}
+
+/// The stream of sample points that rows use.
+const ROWS: u32 = 0x0100;
+
+impl HitTable {
+    /// An empty table for elements of the given areas (m²).
+    pub fn new(area: Vec<f64>, ids: &IdSpace) -> HitTable {
+        HitTable { space: AreaSpace { area }, blocks: Vec::new(), columns: 0, all_ids: ids.len() }
+    }
+
+    /// M: rays per element so far.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Bytes of the table with `columns` rays for each of `elements`.
+    pub fn bytes(elements: usize, columns: usize) -> usize {
+        elements * columns * size_of::<u32>()
+    }
+
+    /// Appends columns up to `columns` rays per element (an even number).
+    ///
+    /// # Errors
+    /// [`Stopped`] if `progress` says so; the table is then as it was.
+    pub fn extend(
+        &mut self,
+        tracer: &Tracer,
+        ids: &IdSpace,
+        receivers: &impl Receivers,
+        columns: usize,
+        progress: &impl Progress,
+    ) -> Result<(), Stopped> {
+        assert_eq!(receivers.len(), self.space.area.len());
+        let (from, to) = (self.columns / 2, columns.div_ceil(2));
+        if to <= from {
+            return Ok(());
+        }
+        const CHUNK: usize = 256;
+        let half = to - from;
+        let width = 2 * half;
+        let n = receivers.len();
+        let mut block = vec![0u32; width * n];
+        let done = AtomicUsize::new(0);
+        block.par_chunks_mut(width * CHUNK).enumerate().try_for_each(|(chunk, rows)| {
+            for (k, row) in rows.chunks_exact_mut(width).enumerate() {
+                let mut next = [0, half];
+                trace_row(tracer, ids, receivers, chunk * CHUNK + k, (from as u32, to as u32, ROWS), |half, id| {
+                    row[next[half]] = id;
+                    next[half] += 1;
+                });
+                // Neighbouring ids lie in the same cache lines when the row is read back in order.
+                row[..half].sort_unstable();
+                row[half..].sort_unstable();
+            }
+            let rows = rows.len() / width;
+            progress.step(done.fetch_add(rows, Ordering::Relaxed) + rows, n).then_some(()).ok_or(Stopped)
+        })?;
+        self.blocks.push(Block { width, ids: block });
+        self.columns = 2 * to;
+        Ok(())
+    }
+
+    /// Mean of `values` (by id) over each row: h_i = (1/M) Σ_m values[id(i, m)].
+    pub fn rows_mean(&self, values: &[[f32; 4]]) -> Vec<[f32; 4]> {
+        self.halves(values).into_iter().map(|[a, b]| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect()
+    }
+
+    /// The same for the two independent halves of each row.
+    pub fn halves(&self, values: &[[f32; 4]]) -> Vec<[[f32; 4]; 2]> {
+        assert_eq!(values.len(), self.all_ids);
+        let share = 2.0 / self.columns as f32;
+        let n = self.space.area.len();
+        (0..n)
+            .into_par_iter()
+            .with_min_len(256)
+            .map(|i| self.row(i, values).map(|sum| sum.map(|x| x * share)))
+            .collect()
+    }
+
+    #[inline]
+    fn row(&self, i: usize, values: &[[f32; 4]]) -> [[f32; 4]; 2] {
+        let mut sums = [[0f32; 4]; 2];
+        for block in &self.blocks {
+            let row = &block.ids[i * block.width..(i + 1) * block.width];
+            for (sum, ids) in sums.iter_mut().zip(row.chunks_exact(block.width / 2)) {
+                for &id in ids {
+                    let value = values[id as usize];
+                    for k in 0..4 {
+                        sum[k] += value[k];
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// The ids of a row, all of weight 1/M.
+    pub fn row_ids(&self, i: usize) -> impl Iterator<Item = u32> + '_ {
+        self.blocks.iter().flat_map(move |block| block.ids[i * block.width..(i + 1) * block.width].iter().copied())
+    }
+}
+
+impl Transport for HitTable {
+    type Space = AreaSpace;
+
+    fn space(&self) -> &AreaSpace {
+        &self.space
+    }
+
+    /// F b among the elements; sky and nothing give zero here. Bands beyond four are taken four at a time.
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
+        let n = self.space.area.len();
+        let mut values = vec![[0f32; 4]; self.all_ids];
+        for first in (0..bands).step_by(4) {
+            let count = (bands - first).min(4);
+            for (value, b) in values.iter_mut().zip(b.chunks_exact(bands)) {
+                for k in 0..count {
+                    value[k] = b[first + k] as f32;
+                }
+            }
+            let share = 1.0 / self.columns.max(1) as f64;
+            h.par_chunks_exact_mut(bands).with_min_len(256).enumerate().take(n).for_each(|(i, h)| {
+                let [a, c] = self.row(i, &values);
+                for k in 0..count {
+                    h[first + k] = (f64::from(a[k]) + f64::from(c[k])) * share;
+                }
+            });
+        }
+    }
+}

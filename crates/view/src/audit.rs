@@ -1,0 +1,136 @@
+//! The audit: how wrong is an answer, everything included?
+//!
+//! At K points, spread by area, the referee makes two independent unbiased estimates a and b of the irradiance E. For
+//! an answer h, (h − a)(h − b) has the expectation (h − E)²: its mean is an unbiased estimate of the squared error of
+//! everything — mesh, rows, solver, interpolation, leaks — and a·b is one of E². The cost does not depend on the size
+//! of the scene. Its resolution is about σ/K^¼, σ being the referee's own relative noise.
+
+use crate::Referee;
+use radiosity_scene::{Bands, luminance};
+use radiosity_trace::{Place, Tracer};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Standard normal quantile of the one-sided 95 % bound.
+const ONE_SIDED_95: f64 = 1.645;
+
+/// What the audit found.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Audit {
+    /// Points examined.
+    pub points: usize,
+    /// Paths per estimate, two estimates per point.
+    pub paths: u32,
+    /// Estimated relative L2 error of irradiance (luminance-weighted): ‖h − E‖/‖E‖. An estimate below zero, which
+    /// noise can produce, is given as zero.
+    pub error: f64,
+    /// One-sided 95 % upper bound of the error.
+    pub upper: f64,
+    /// One-sided 95 % lower bound of the error.
+    pub lower: f64,
+    /// Mean of h − E over mean of E.
+    pub bias: f64,
+    /// Standard error of `bias`.
+    pub bias_error: f64,
+    /// Mean illuminance at the points by the referee, lux.
+    pub mean_illuminance: f64,
+}
+
+/// Referee estimates at a fixed set of points, kept and refined while answers come and go. Judging several answers by
+/// the same estimates is fair to each, and costs the referee's paths once.
+pub struct Auditor<'a> {
+    referee: Referee<'a>,
+    places: Vec<Place>,
+    /// Sums of the two independent estimates of illuminance at each place.
+    sums: Vec<[f64; 2]>,
+    paths: u32,
+    seed: u64,
+}
+
+impl<'a> Auditor<'a> {
+    /// An auditor of places that are spread evenly by area. Different seeds are independent.
+    pub fn new(tracer: &'a Tracer<'a>, places: Vec<Place>, seed: u64) -> Auditor<'a> {
+        let sums = vec![[0.0; 2]; places.len()];
+        Auditor { referee: Referee::new(tracer), places, sums, paths: 0, seed }
+    }
+
+    /// The places, in the order in which answers are expected.
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// Paths per estimate so far.
+    pub fn paths(&self) -> u32 {
+        self.paths
+    }
+
+    /// Traces until each estimate has `paths` paths. `step` is told how many places are done and may end it, which
+    /// leaves the estimates as they were.
+    pub fn trace(&mut self, paths: u32, step: impl Fn(usize) -> bool + Sync) -> bool {
+        let more = paths.saturating_sub(self.paths);
+        if more == 0 {
+            return true;
+        }
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let (referee, places, first) = (&self.referee, &self.places, self.paths);
+        let seed = self.seed;
+        let added: Option<Vec<[f64; 2]>> = (0..places.len())
+            .into_par_iter()
+            .map(|i| {
+                let pair = std::array::from_fn(|half| {
+                    let seed = seed << 48 ^ (i as u64) << 24 ^ u64::from(first) << 1 ^ half as u64;
+                    f64::from(luminance(referee.irradiance(&places[i], more, seed))) * f64::from(more)
+                });
+                let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+                step(so_far).then_some(pair)
+            })
+            .collect();
+        let Some(added) = added else { return false };
+        for (sum, added) in self.sums.iter_mut().zip(added) {
+            sum[0] += added[0];
+            sum[1] += added[1];
+        }
+        self.paths += more;
+        true
+    }
+
+    /// Judges an answer `h`: lux per band at each place.
+    pub fn judge(&self, h: &[Bands]) -> Audit {
+        assert_eq!(self.places.len(), h.len());
+        if self.paths == 0 || h.is_empty() {
+            return Audit { upper: f64::INFINITY, ..Audit::default() };
+        }
+        judge(&self.sums, h, self.paths)
+    }
+}
+
+fn judge(sums: &[[f64; 2]], h: &[Bands], paths: u32) -> Audit {
+    let n = sums.len() as f64;
+    let pairs: Vec<[f64; 3]> = sums
+        .iter()
+        .zip(h)
+        .map(|([a, b], h)| [a / f64::from(paths), b / f64::from(paths), f64::from(luminance(*h))])
+        .collect();
+    let mean = |f: &dyn Fn(&[f64; 3]) -> f64| pairs.iter().map(f).sum::<f64>() / n.max(1.0);
+    let deviation = |f: &dyn Fn(&[f64; 3]) -> f64, mean: f64| {
+        (pairs.iter().map(|p| (f(p) - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
+    };
+    let product = |[a, b, h]: &[f64; 3]| (h - a) * (h - b);
+    let square = mean(&|[a, b, _]| a * b).max(f64::MIN_POSITIVE);
+    let squared_error = mean(&product);
+    let noise = deviation(&product, squared_error);
+    let level = mean(&|[a, b, _]| 0.5 * (a + b));
+    let shift = |[a, b, h]: &[f64; 3]| h - 0.5 * (a + b);
+    let bias = mean(&shift);
+    let root = |x: f64| (x.max(0.0) / square).sqrt();
+    Audit {
+        points: sums.len(),
+        paths,
+        error: root(squared_error),
+        upper: root(squared_error.max(0.0) + ONE_SIDED_95 * noise),
+        lower: root(squared_error - ONE_SIDED_95 * noise),
+        bias: bias / level.max(f64::MIN_POSITIVE),
+        bias_error: deviation(&shift, bias) / level.max(f64::MIN_POSITIVE),
+        mean_illuminance: level,
+    }
+}

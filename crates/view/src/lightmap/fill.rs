@@ -1,0 +1,84 @@
+//! A page's picture from its texels; the rest continues its surroundings (push–pull: averages of the known texels are
+//! pushed up a pyramid and pulled back down where nothing is known), so that mip-maps and wide filters stay clean.
+
+use super::Texel;
+use radiosity_scene::Bands;
+
+/// A row-major picture of `page` = width and height with `values[i]` at `texels[i]`.
+///
+/// Texels outside the page and texels without a finite value are skipped; a page without any value is black.
+pub fn fill(page: [u32; 2], texels: &[Texel], values: &[Bands]) -> Vec<Bands> {
+    let [width, height] = page.map(|side| side as usize);
+    let mut level = Level { width, height, known: vec![None; width * height] };
+    for (texel, value) in texels.iter().zip(values) {
+        let (x, y) = (usize::from(texel.x), usize::from(texel.y));
+        if x < width && y < height && value.iter().all(|v| v.is_finite()) {
+            level.known[y * width + x] = Some(*value);
+        }
+    }
+
+    let mut pyramid = vec![level];
+    while let Some(last) = pyramid.last().filter(|level| level.width > 1 || level.height > 1) {
+        let coarser = last.halved();
+        pyramid.push(coarser);
+    }
+    while let Some(coarse) = pyramid.pop() {
+        let Some(fine) = pyramid.last_mut() else {
+            return coarse.known.into_iter().map(Option::unwrap_or_default).collect();
+        };
+        let width = fine.width;
+        for (index, slot) in fine.known.iter_mut().enumerate() {
+            if slot.is_none() {
+                *slot = coarse.known[index / width / 2 * coarse.width + index % width / 2];
+            }
+        }
+    }
+    Vec::new()
+}
+
+struct Level {
+    width: usize,
+    height: usize,
+    known: Vec<Option<Bands>>,
+}
+
+impl Level {
+    /// The mean of the known ones among each 2 × 2.
+    fn halved(&self) -> Level {
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let mut known = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let (mut sum, mut count) = ([0.0; 3], 0.0);
+                for (x, y) in [(2 * x, 2 * y), (2 * x + 1, 2 * y), (2 * x, 2 * y + 1), (2 * x + 1, 2 * y + 1)] {
+                    if x < self.width
+                        && y < self.height
+                        && let Some(value) = self.known[y * self.width + x]
+                    {
+                        sum = std::array::from_fn(|band| sum[band] + value[band]);
+                        count += 1.0;
+                    }
+                }
+                known.push((count > 0.0).then(|| sum.map(|s: f32| s / count)));
+            }
+        }
+        Level { width, height, known }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec2;
+
+    #[test]
+    fn empty_texels_continue_their_neighbours() {
+        let at = |x, y| Texel { x, y, triangle: 0, uv: Vec2::ZERO };
+        let picture = fill([7, 5], &[at(0, 0), at(6, 4), at(1, 3)], &[[1.0; 3], [3.0; 3], [f32::NAN; 3]]);
+        assert_eq!(picture.len(), 35);
+        assert_eq!((picture[0], picture[1], picture[34]), ([1.0; 3], [1.0; 3], [3.0; 3]));
+        assert!(picture.iter().flatten().all(|v| (1.0..=3.0).contains(v)));
+        assert_eq!(fill([2, 1], &[], &[]), [[0.0; 3]; 2]);
+        assert!(fill([0, 0], &[], &[]).is_empty());
+    }
+}

@@ -1,0 +1,243 @@
+//! Pictures: which surfaces the pixels of a camera see, exposure, tone mapping, false colours.
+//!
+//! A pixel is sampled on a 4 × 4 grid. Samples that see the same smooth surface share one evaluation of irradiance,
+//! because light changes slowly within a pixel where edges do not; reflectance is looked up at each. Edges come out
+//! smooth at the price of little more than one evaluation per pixel.
+
+use glam::{DVec2, DVec3};
+use radiosity_scene::{Bands, Camera, Side, luminance};
+use radiosity_trace::{Found, Place, Tracer};
+use rayon::prelude::*;
+
+/// Samples along each side of a pixel.
+const GRID: u32 = 4;
+
+/// Samples of one pixel share an irradiance when their normals differ by less than this (cosine of 15°).
+const SAME_SURFACE: f64 = 0.966;
+
+/// A point that a picture needs the irradiance of, and what it adds to which pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Pixel, row-major from the top left.
+    pub pixel: u32,
+    /// The point, with the shading normal on the side that is seen.
+    pub place: Place,
+    /// Barycentric coordinates on its mesh triangle.
+    pub uv: DVec2,
+    /// Side that is seen.
+    pub side: Side,
+    /// Luminance that the pixel gains per unit of irradiance: Σ ρ/π over the samples, per band.
+    pub response: Bands,
+}
+
+/// All that a camera sees.
+#[derive(Clone, Debug)]
+pub struct ViewRays {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Points to evaluate, by pixel.
+    pub seen: Vec<Seen>,
+    /// Luminance that needs no evaluation: emission and sky, cd/m² per band and pixel.
+    pub own: Vec<Bands>,
+}
+
+impl ViewRays {
+    /// Casts the camera's rays.
+    pub fn new(tracer: &Tracer, camera: &Camera, width: u32, height: u32) -> ViewRays {
+        let rows: Vec<(Vec<Seen>, Vec<Bands>)> = (0..height)
+            .into_par_iter()
+            .map(|row| {
+                let (mut seen, mut own) = (Vec::new(), Vec::new());
+                for column in 0..width {
+                    own.push(cast_pixel(tracer, camera, (width, height), (column, row), &mut seen));
+                }
+                (seen, own)
+            })
+            .collect();
+        let mut view = ViewRays { width, height, seen: Vec::new(), own: Vec::new() };
+        for (seen, own) in rows {
+            view.seen.extend(seen);
+            view.own.extend(own);
+        }
+        view
+    }
+
+    /// The picture for irradiances (lux per band) of `seen`, in order.
+    pub fn picture(&self, irradiance: &[Bands]) -> Picture {
+        assert_eq!(irradiance.len(), self.seen.len());
+        let mut pixels = self.own.clone();
+        for (seen, e) in self.seen.iter().zip(irradiance) {
+            let pixel = &mut pixels[seen.pixel as usize];
+            for band in 0..3 {
+                pixel[band] += seen.response[band] * e[band];
+            }
+        }
+        Picture { width: self.width, height: self.height, pixels }
+    }
+}
+
+fn cast_pixel(
+    tracer: &Tracer,
+    camera: &Camera,
+    (width, height): (u32, u32),
+    (column, row): (u32, u32),
+    seen: &mut Vec<Seen>,
+) -> Bands {
+    let aspect = f64::from(width) / f64::from(height);
+    let share = 1.0 / (GRID * GRID) as f32;
+    let first = seen.len();
+    let pixel = row * width + column;
+    let mut own = [0f32; 3];
+    for sample in 0..GRID * GRID {
+        let x = (f64::from(column) + (f64::from(sample % GRID) + 0.5) / f64::from(GRID)) / f64::from(width);
+        let y = (f64::from(row) + (f64::from(sample / GRID) + 0.5) / f64::from(GRID)) / f64::from(height);
+        let (origin, direction) = camera.ray(2.0 * x - 1.0, 1.0 - 2.0 * y, aspect);
+        let scene = tracer.scene;
+        match tracer.seen(&tracer.free_ray(origin, direction), pixel * GRID * GRID + sample) {
+            Found::Back => {}
+            Found::Escaped => {
+                let sky = scene.sky.luminance(direction, scene.up.direction());
+                for band in 0..3 {
+                    own[band] += share * sky[band];
+                }
+            }
+            Found::Surface { triangle, uv, side, .. } => {
+                let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
+                let at = tracer.mesh.surface(triangle as usize, uv);
+                let emitted = scene.emitted_luminance(at);
+                let reflectance = scene.reflectance(at);
+                let response = reflectance.map(|r| r * share / std::f32::consts::PI);
+                for band in 0..3 {
+                    own[band] += share * emitted[band];
+                }
+                let normal = shading_normal(tracer, triangle as usize, uv, side);
+                let similar = seen[first..].iter_mut().find(|s| {
+                    s.side == side && s.place.normal.dot(normal) > SAME_SURFACE && continues(tracer, s, triangle)
+                });
+                match similar {
+                    Some(seen) => (0..3).for_each(|band| seen.response[band] += response[band]),
+                    None => {
+                        let point = tracer.mesh.point(triangle as usize, uv);
+                        let place = Place { point, normal, triangle };
+                        seen.push(Seen { pixel, place, uv, side, response });
+                    }
+                }
+            }
+        }
+    }
+    own
+}
+
+/// Whether a triangle belongs to the smooth surface that an earlier sample of the pixel lies on.
+fn continues(tracer: &Tracer, seen: &Seen, triangle: u32) -> bool {
+    let (a, b) = (seen.place.triangle as usize, triangle as usize);
+    a == b || tracer.mesh.smooth[a].iter().any(|corner| tracer.mesh.smooth[b].contains(corner))
+}
+
+/// The normal that light is received with: the author's smooth one where there is one, else the triangle's; on the
+/// given side, and never turned away from it.
+pub fn shading_normal(tracer: &Tracer, triangle: usize, uv: DVec2, side: Side) -> DVec3 {
+    let sign = if side == Side::Front { 1.0 } else { -1.0 };
+    let flat = tracer.mesh.normal(triangle);
+    let smooth = tracer.scene.shading_normal(tracer.mesh.surface(triangle, uv)).unwrap_or(flat);
+    // An author's normal that points to the other side is a mistake of the file, not a curved surface.
+    sign * if smooth.dot(flat) > 0.1 { smooth } else { flat }
+}
+
+/// Luminances of a picture, cd/m² per band, row-major from the top left.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Luminances.
+    pub pixels: Vec<Bands>,
+}
+
+impl Picture {
+    /// The exposure (log2 of the factor) that puts the picture's median surface luminance at 18 % grey, but keeps
+    /// nine tenths of the picture below 80 % so that bright rooms are not washed out.
+    pub fn exposure(&self) -> f64 {
+        let mut lit: Vec<f32> = self.pixels.iter().map(|p| luminance(*p)).filter(|l| *l > 0.0).collect();
+        if lit.is_empty() {
+            return 0.0;
+        }
+        lit.sort_unstable_by(f32::total_cmp);
+        let at = |share: f64| f64::from(lit[((lit.len() - 1) as f64 * share) as usize]).max(1e-30);
+        (0.24 / at(0.5)).min(0.8 / at(0.9)).log2()
+    }
+
+    /// 8-bit sRGB pixels, exposed by 2^`exposure` and tone-mapped: linear up to about one half, then a smooth shoulder
+    /// that reaches white at 8 times that and keeps hues.
+    pub fn tone_mapped(&self, exposure: f64) -> Vec<[u8; 3]> {
+        let factor = exposure.exp2() as f32;
+        let width = self.width.max(1) as usize;
+        self.pixels
+            .par_iter()
+            .enumerate()
+            .map(|(i, pixel)| {
+                let exposed = pixel.map(|l| l * factor);
+                let mapped = tone_map(exposed);
+                // A quarter of a step of ordered dither hides the banding of 8 bits on smooth walls.
+                let dither = (BAYER[i / width % 4][i % width % 4] as f32 + 0.5) / 16.0 - 0.5;
+                mapped.map(|c| (srgb(c) * 255.0 + 0.5 + dither * 0.9).clamp(0.0, 255.0) as u8)
+            })
+            .collect()
+    }
+}
+
+const BAYER: [[u8; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+
+/// Compresses by the largest channel, then lets very bright colours fade to white as film does.
+fn tone_map(color: Bands) -> Bands {
+    const KNEE: f32 = 0.5;
+    const WHITE: f32 = 8.0;
+    let peak = color[0].max(color[1]).max(color[2]);
+    if peak <= KNEE {
+        return color;
+    }
+    // Above the knee: y = knee + (1 − knee) · (1 − e^{−s})/(1 − e^{−S}), with slope one at the knee.
+    let range = 1.0 - KNEE;
+    let end = 1.0 - (-(WHITE - KNEE) / range).exp();
+    let mapped = KNEE + range * (1.0 - (-(peak - KNEE) / range).exp()) / end;
+    let fade = ((peak - 1.0) / (WHITE - 1.0)).clamp(0.0, 1.0);
+    color.map(|c| {
+        let hue = c / peak * mapped;
+        (hue + fade * (mapped - hue)).min(1.0)
+    })
+}
+
+/// sRGB encoding (IEC 61966-2-1) of a linear value in 0..1.
+pub fn srgb(linear: f32) -> f32 {
+    let x = linear.clamp(0.0, 1.0);
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tone_mapping_is_linear_below_the_knee_and_monotonic_above() {
+        assert_eq!(tone_map([0.2, 0.4, 0.5]), [0.2, 0.4, 0.5]);
+        let mut last = 0.0;
+        for i in 1..2000 {
+            let y = tone_map([i as f32 * 0.01; 3])[1];
+            assert!(y >= last && y <= 1.0, "{i}");
+            last = y;
+        }
+        assert!((tone_map([8.0; 3])[0] - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_grey_picture_is_exposed_to_middle_grey() {
+        let picture = Picture { width: 4, height: 4, pixels: vec![[300.0; 3]; 16] };
+        let factor = picture.exposure().exp2() * 300.0;
+        assert!((factor - 0.24).abs() < 1e-3, "{factor}");
+        let mapped = picture.tone_mapped(picture.exposure());
+        assert!(mapped.iter().all(|p| (120..=140).contains(&p[0])), "{:?}", mapped[0]);
+    }
+}
