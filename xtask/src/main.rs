@@ -1,5 +1,6 @@
 //! Workspace tasks, run as `cargo xtask VERB`.
 
+mod ci;
 mod fault;
 mod glb;
 mod hash;
@@ -12,6 +13,7 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 Usage: cargo xtask VERB
 
+  ci                                      run every check: format, import rule, licences, lints, tests, docs
   showcase [-o FILE]                      write the furnished living room (default out/showcase.glb)
   scenes building [--rooms N] -o FILE     write a closed building of N rooms joined by doors (default 16)
   scenes soup [--triangles N] -o FILE     write a closed room filled with small boxes (default 10000)
@@ -24,6 +26,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match arguments.split_first() {
+        Some((&"ci", rest)) => ci::command(rest),
         Some((&"showcase", rest)) => showcase::command(rest),
         Some((&"scenes", rest)) => scenes::command(rest),
         Some((&("help" | "-h" | "--help"), _)) => Ok(USAGE.to_owned()),

@@ -17,6 +17,7 @@ mod data_uri;
 mod error;
 pub mod gltf;
 pub mod gltf_out;
+pub mod image_out;
 mod load;
 pub mod obj;
 mod options;

@@ -24,6 +24,9 @@ pub enum Error {
         /// Megabytes allowed.
         allowed: usize,
     },
+    /// The lightmap cannot be laid out.
+    #[error("lightmap: {0}")]
+    Lightmap(radiosity_view::lightmap::LightmapError),
     /// The scene has nothing to compute.
     #[error("{0}")]
     Empty(&'static str),

@@ -14,6 +14,7 @@
 //! ```
 
 pub mod answer;
+pub mod bake;
 mod cornell;
 mod error;
 pub mod measure;
@@ -23,6 +24,7 @@ mod solution;
 pub mod stations;
 
 pub use answer::{Answer, Indirect};
+pub use bake::{BakeOptions, Baked, Lightmap, bake, lightmap, vertex_light};
 pub use cornell::cornell_box;
 pub use error::Error;
 pub use measure::{MeasureOptions, Measurement, measure};

@@ -106,9 +106,8 @@ impl<'a> Solution<'a> {
             return Err(Error::Empty("the scene has no surface"));
         }
         let stages = Stages::default();
-        let total: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
-        let element_size = options.element_size.unwrap_or_else(|| (2.0 * total / AUTOMATIC_ELEMENTS).sqrt());
-        let needed = HitTable::bytes(Elements::count(scene, mesh, element_size), options.rays);
+        let element_size = element_size(tracer, options);
+        let needed = Solution::memory(tracer, options);
         if needed > options.memory {
             let megabytes = |bytes: usize| bytes.div_ceil(1 << 20);
             return Err(Error::Memory {
@@ -166,6 +165,12 @@ impl<'a> Solution<'a> {
         };
         solution.refine(options.rays, monitor)?;
         Ok(solution)
+    }
+
+    /// Bytes that the table of hit ids takes with these options.
+    pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
+        let (scene, mesh) = (tracer.scene, tracer.mesh);
+        HitTable::bytes(Elements::count(scene, mesh, element_size(tracer, options)), options.rays)
     }
 
     /// The tracer that the solution was made with.
@@ -373,4 +378,13 @@ impl<'a> Solution<'a> {
             sums.map(|s| s.map(|x| x as f32));
         Balance { emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs, defect }
     }
+}
+
+/// Width of an element: as asked, or such that the scene's area makes [`AUTOMATIC_ELEMENTS`].
+fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
+    let mesh = tracer.mesh;
+    options.element_size.unwrap_or_else(|| {
+        let total: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+        (2.0 * total / AUTOMATIC_ELEMENTS).sqrt()
+    })
 }

@@ -81,6 +81,11 @@ impl Exposure {
         Ok(Exposure { buried, partial: masks.len() - buried, masks })
     }
 
+    /// Whether some of an element may be buried.
+    pub fn is_partial(&self, element: u32) -> bool {
+        self.masks.contains_key(&element)
+    }
+
     /// Whether nothing of an element is exposed.
     pub fn is_buried(&self, element: u32) -> bool {
         self.masks.get(&element) == Some(&0)
