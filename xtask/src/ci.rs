@@ -83,8 +83,11 @@ fn cargo_command() -> Command {
     command
 }
 
+/// Root of the workspace that `cargo run` was called in. Not where this was compiled: two checkouts that share a target
+/// folder share the program, and the one would be judged in place of the other.
 fn root() -> PathBuf {
-    let mut path = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let manifest = std::env::var_os("CARGO_MANIFEST_DIR");
+    let mut path = manifest.map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
     path.pop();
     path
 }

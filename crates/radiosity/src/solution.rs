@@ -306,8 +306,7 @@ impl<'a> Solution<'a> {
 
     /// Exposed area of each element, m²; zero where it is buried.
     pub fn exposed_area(&self) -> Vec<f64> {
-        let exposed = |e: usize| if self.exposure.is_buried(e as u32) { 0.0 } else { self.area[e] };
-        (0..self.elements.len()).map(exposed).collect()
+        self.area.iter().enumerate().map(|(e, area)| area * self.exposure.share(e as u32)).collect()
     }
 
     /// Area-weighted relative standard error of the irradiance that comes from the rows' sampling, by the difference

@@ -86,6 +86,11 @@ impl Exposure {
         self.masks.contains_key(&element)
     }
 
+    /// Share of an element's area that is exposed.
+    pub fn share(&self, element: u32) -> f64 {
+        self.masks.get(&element).map_or(1.0, |mask| f64::from(mask.count_ones()) / 64.0)
+    }
+
     /// Whether nothing of an element is exposed.
     pub fn is_buried(&self, element: u32) -> bool {
         self.masks.get(&element) == Some(&0)

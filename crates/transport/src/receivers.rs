@@ -6,6 +6,9 @@ use glam::DVec3;
 use radiosity_scene::{Elements, Mesh};
 use radiosity_trace::{Place, Tracer};
 
+/// Places keep off the border of their element by about this many welding tolerances (millionths of the scene).
+const BORDER: f64 = 4.0;
+
 /// A list of places that receive light.
 pub trait Receivers: Sync {
     /// How many.
@@ -47,8 +50,12 @@ impl Receivers for ElementReceivers<'_> {
         let element = i as u32;
         let (triangle, _) = self.elements.place(element);
         let uv = self.elements.sample(element, x, y);
+        let point = self.mesh.point(triangle, uv);
+        // Away from the border by more than rounding moves a ray's origin: a place within a billionth of a wall's foot
+        // would let rays start inside the wall.
+        let inset = (BORDER * self.mesh.tolerance / self.elements.area(self.mesh, element).sqrt()).min(0.25);
         Some(Place {
-            point: self.mesh.point(triangle, uv),
+            point: point + inset * (self.elements.centre(self.mesh, element) - point),
             normal: self.elements.normal(self.mesh, element),
             triangle: triangle as u32,
         })
