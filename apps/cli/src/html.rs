@@ -492,6 +492,7 @@ fn number(x: f64) -> String {
         1e-3..1e3 => format!("{sign}{rounded}"),
         1e3..1e9 => format!("{sign}{}", count(size.round() as usize)),
         _ => {
+            let rounded = if rounded.is_finite() { rounded } else { size };
             let text = format!("{rounded:e}");
             let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
             let raise = |c: char| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c.to_digit(10).unwrap_or(0) as usize).unwrap_or('⁰');

@@ -9,6 +9,8 @@ pub trait Space {
     fn dim(&self) -> usize;
     /// Inner product of two fields, band by band.
     fn inner(&self, x: &[f64], y: &[f64], bands: usize) -> Vec<f64>;
+    /// Hands out each number of a field times its weight in the inner product.
+    fn accumulate(&self, x: &[f64], bands: usize, add: impl FnMut(usize, f64));
 }
 
 /// h = F b for all bands at once.
@@ -19,6 +21,11 @@ pub trait Transport: Sync {
     fn space(&self) -> &Self::Space;
     /// Writes F b into `h`; both have `dim × bands` numbers.
     fn apply(&self, b: &[f64], h: &mut [f64], bands: usize);
+    /// Labels 0.. of the unknowns such that no row of F reaches from one label to another: rooms that do not see each
+    /// other. `None` where that is not known.
+    fn parts(&self) -> Option<&[u32]> {
+        None
+    }
 }
 
 /// R: what surfaces make of the light that they receive.
@@ -54,6 +61,12 @@ impl Space for AreaSpace {
             }
         }
         sum
+    }
+
+    fn accumulate(&self, x: &[f64], bands: usize, mut add: impl FnMut(usize, f64)) {
+        for (i, x) in x.iter().enumerate() {
+            add(i, self.area[i / bands] * x);
+        }
     }
 }
 

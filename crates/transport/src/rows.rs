@@ -110,6 +110,8 @@ pub struct HitTable {
     blocks: Vec<Block>,
     columns: usize,
     all_ids: usize,
+    /// Label of each element: elements that see each other, directly or through others, share one.
+    parts: Vec<u32>,
 }
 
 /// The stream of sample points that rows use.
@@ -118,7 +120,10 @@ const ROWS: u32 = 0x0100;
 impl HitTable {
     /// An empty table for elements of the given areas (m²).
     pub fn new(area: Vec<f64>, ids: &IdSpace) -> HitTable {
-        HitTable { space: AreaSpace { area }, blocks: Vec::new(), columns: 0, all_ids: ids.len() }
+        {
+            let parts = (0..area.len() as u32).collect();
+            HitTable { space: AreaSpace { area }, blocks: Vec::new(), columns: 0, all_ids: ids.len(), parts }
+        }
     }
 
     /// M: rays per element so far.
@@ -168,9 +173,49 @@ impl HitTable {
             let rows = rows.len() / width;
             progress.step(done.fetch_add(rows, Ordering::Relaxed) + rows, n).then_some(()).ok_or(Stopped)
         })?;
+        self.join_parts(&block, width);
         self.blocks.push(Block { width, ids: block });
         self.columns = 2 * to;
         Ok(())
+    }
+
+    /// Joins the labels of elements that rows connect, and numbers them anew from 0.
+    fn join_parts(&mut self, ids: &[u32], width: usize) {
+        let n = self.parts.len();
+        // Labels as a forest: each points to an element of its set with a number no larger than its own.
+        let mut first = vec![u32::MAX; n];
+        let mut parent: Vec<u32> = (0..n as u32).collect();
+        for (i, label) in self.parts.iter().enumerate() {
+            let first = &mut first[*label as usize];
+            *first = (*first).min(i as u32);
+            parent[i] = *first;
+        }
+        fn root(parent: &mut [u32], mut i: u32) -> u32 {
+            while parent[i as usize] != i {
+                parent[i as usize] = parent[parent[i as usize] as usize];
+                i = parent[i as usize];
+            }
+            i
+        }
+        for (i, row) in ids.chunks_exact(width).enumerate() {
+            let mut own = root(&mut parent, i as u32);
+            for &id in row.iter().filter(|id| (**id as usize) < n) {
+                let other = root(&mut parent, id);
+                let (low, high) = (own.min(other), own.max(other));
+                parent[high as usize] = low;
+                own = low;
+            }
+        }
+        let mut next = 0;
+        let mut number = vec![u32::MAX; n];
+        for i in 0..n {
+            let root = root(&mut parent, i as u32) as usize;
+            if number[root] == u32::MAX {
+                number[root] = next;
+                next += 1;
+            }
+            self.parts[i] = number[root];
+        }
     }
 
     /// Mean of `values` (by id) over each row: h_i = (1/M) Σ_m values[id(i, m)].
@@ -218,6 +263,10 @@ impl Transport for HitTable {
 
     fn space(&self) -> &AreaSpace {
         &self.space
+    }
+
+    fn parts(&self) -> Option<&[u32]> {
+        Some(&self.parts)
     }
 
     /// F b among the elements; sky and nothing give zero here. Bands beyond four are taken four at a time.
