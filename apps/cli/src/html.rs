@@ -102,7 +102,7 @@ fn verdict(report: &Report) -> String {
              difference of illuminance, divided by the root mean square illuminance.</p>\
              <p>Each limit holds by itself with 95 % confidence, both together with 90 %. The bias is the mean \
              difference over the mean illuminance; its interval holds with 95 %. <b>To repeat:</b> run again with \
-             another seed; the new estimate should fall between the limits.</p>",
+             another seed; the new limits should nearly always overlap these.</p>",
             plural(audit.points, "point"),
             plural(audit.paths as usize, "path"),
         )),
@@ -329,8 +329,10 @@ fn balance(report: &Report) -> String {
 
 fn solver(report: &Report) -> String {
     let band = |values: &[f64], i: usize| number(values.get(i).copied().unwrap_or(f64::NAN));
-    let row = |name: &str, values: &[f64]| [name.to_owned(), band(values, 0), band(values, 1), band(values, 2)].to_vec();
-    let rows = [row("Relative residual", &report.solver.residual), row("Guaranteed bound, lm/m²", &report.solver.bound)];
+    let row =
+        |name: &str, values: &[f64]| [name.to_owned(), band(values, 0), band(values, 1), band(values, 2)].to_vec();
+    let rows =
+        [row("Relative residual", &report.solver.residual), row("Guaranteed bound, lm/m²", &report.solver.bound)];
     let cards = cards(&[
         ("Raw closure", number(report.raw_closure), "largest row sum's distance from one".to_owned()),
         ("Steps", count(report.solver.steps), "applications of the transport".to_owned()),
@@ -453,7 +455,9 @@ fn bar(parts: &[(&str, f64)]) -> String {
         rects += &format!("<rect class=\"{class}\" x=\"{x:.1}\" width=\"{width:.1}\" height=\"10\"/>");
         x += width;
     }
-    format!("<svg class=\"bar\" viewBox=\"0 0 1000 10\" preserveAspectRatio=\"none\" aria-hidden=\"true\">{rects}</svg>")
+    format!(
+        "<svg class=\"bar\" viewBox=\"0 0 1000 10\" preserveAspectRatio=\"none\" aria-hidden=\"true\">{rects}</svg>"
+    )
 }
 
 fn escape(text: &str) -> String {
@@ -471,7 +475,7 @@ fn count(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             out.push('\u{202f}');
         }
         out.push(digit);
@@ -512,7 +516,7 @@ fn percent(x: f64) -> String {
 
 fn duration(seconds: f64) -> String {
     match seconds {
-        s if s >= 120.0 && s < 1e9 => format!("{} min {:02} s", count(s as usize / 60), s as usize % 60),
+        s if (120.0..1e9).contains(&s) => format!("{} min {:02} s", count(s as usize / 60), s as usize % 60),
         s if s > 0.0 && s < 1.0 => with_unit(1e3 * s, "ms"),
         s => with_unit(s, "s"),
     }

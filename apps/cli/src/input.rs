@@ -174,7 +174,7 @@ fn bytes(text: &str) -> Result<usize, String> {
         t => (t.to_owned(), 1),
     };
     let value = positive(&number).map_err(|_| wrong())? * scale as f64;
-    if value < 1.0 || value > 1e15 { Err(wrong()) } else { Ok(value as usize) }
+    if (1.0..=1e15).contains(&value) { Ok(value as usize) } else { Err(wrong()) }
 }
 
 /// Size of a picture, WIDTHxHEIGHT.

@@ -1,7 +1,7 @@
 //! The account of a run, as data; [`crate::html`] makes a page of it.
 
-use radiosity::measure::Round;
 use radiosity::Balance;
+use radiosity::measure::Round;
 use radiosity::{Audit, Faults};
 use serde::Serialize;
 

@@ -90,9 +90,9 @@ impl Solution<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Answer, Error> {
         let direct = self.direct_at(places, shadowing, monitor)?;
-        let halves = self.stages.time(monitor, "gather", || {
-            self.gather().irradiance(&PointReceivers { places }, rays, &Watch(monitor))
-        })?;
+        let halves = self
+            .stages
+            .time(monitor, "gather", || self.gather().irradiance(&PointReceivers { places }, rays, &Watch(monitor)))?;
         let mut answer = Answer { direct, ..Answer::default() };
         for ([a, b], d) in halves.iter().zip(&answer.direct) {
             answer.irradiance.push(std::array::from_fn(|k| d[k] + 0.5 * (a[k] + b[k])));

@@ -199,6 +199,12 @@ pub struct Lightmap {
 /// Texels that the program spends where no density is asked for.
 const AUTOMATIC_TEXELS: f64 = 200_000.0;
 
+/// A vertex of a primitive: its slot, source corners, weights and texture coordinates, the floats by their bits.
+type VertexKey = (usize, [u32; 3], [u32; 3], [u32; 2]);
+
+/// A place and a normal, both on a grid.
+type PlaceKey = ([i64; 3], [i32; 3]);
+
 /// Bakes a solution into a lightmap.
 ///
 /// # Errors
@@ -254,7 +260,7 @@ pub fn lightmap(
 
     let mut primitives: Vec<LitPrimitive> = Vec::new();
     let mut current: HashMap<(usize, Side, u32), usize> = HashMap::new();
-    let mut known: HashMap<(usize, [u32; 3], [u32; 3], [u32; 2]), u32> = HashMap::new();
+    let mut known: HashMap<VertexKey, u32> = HashMap::new();
     for (index, face) in faces.iter().enumerate() {
         let page = atlas.triangle_page[index];
         let slot = *current.entry((face.object, face.side, page)).or_insert_with(|| {
@@ -377,7 +383,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<Vec<LitPrimi
     let all: Vec<Station> = at.concat();
     let light = solution.at(&all, Indirect::Field(&baked.field), &baked.shadowing, monitor)?.irradiance;
     // Vertices at one place of one smooth surface share their mean, so that no seam shows; hidden ones do not count.
-    let mut shared: HashMap<([i64; 3], [i32; 3]), ([f64; 3], f64)> = HashMap::new();
+    let mut shared: HashMap<PlaceKey, ([f64; 3], f64)> = HashMap::new();
     let grid = 4.0 * mesh.tolerance.max(1e-9) + 4e-3 * solution.element_size;
     let key = |s: &Station| {
         let cell = ((s.place.point + DVec3::splat(0.37 * grid)) / grid).floor().as_i64vec3().to_array();

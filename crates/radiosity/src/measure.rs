@@ -34,6 +34,9 @@ impl Default for MeasureOptions {
     }
 }
 
+/// Fewest pairs of estimates that an audit judges by.
+const LEAST_WATCHED: usize = 64;
+
 /// One round of refinement.
 #[derive(Clone, Debug, Serialize)]
 pub struct Round {
@@ -99,7 +102,11 @@ pub fn measure(
 
     // The referee looks at every n-th point.
     let stride = places.len().div_ceil(options.audit_points.max(1)).max(1);
-    let watched: Vec<usize> = (0..places.len()).step_by(stride).collect();
+    let mut watched: Vec<usize> = (0..places.len()).step_by(stride).collect();
+    // Few points are looked at several times, each time by independent paths, so that the audit knows its own noise.
+    while !watched.is_empty() && watched.len() < LEAST_WATCHED {
+        watched.extend_from_within(..);
+    }
     let mut auditor = Auditor::new(tracer, watched.iter().map(|&i| places[i]).collect(), options.seed);
     let most_paths = rays_for(options.error, 4096.0, 64, 1 << 16) as u32;
     let mut rounds = Vec::new();

@@ -4,7 +4,7 @@ use crate::answer::Station;
 use crate::monitor::Monitor;
 use crate::{Error, Indirect, Solution};
 use glam::DVec3;
-use radiosity_scene::Camera;
+use radiosity_scene::{Camera, Side};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame};
 use radiosity_trace::{Found, Tracer};
 use radiosity_transport::Shadowing;
@@ -94,7 +94,8 @@ fn inside_score(tracer: &Tracer, eye: DVec3, centre: DVec3, size: &DVec3) -> f64
         let [u, v, w, _] = sequence.point(i);
         let pole = if w < 0.5 { towards } else { -towards };
         let direction = cosine_direction(&frame(pole), f64::from(u), f64::from(v));
-        if let Found::Surface { distance, .. } = tracer.first(&tracer.free_ray(eye, direction), i) {
+        // The far side of a double-sided surface may be the inside of a solid; a room shows its fronts.
+        if let Found::Surface { distance, side: Side::Front, .. } = tracer.first(&tracer.free_ray(eye, direction), i) {
             fronts += 1;
             nearest = nearest.min(f64::from(distance));
             if direction.dot(towards) > 0.8 {

@@ -131,9 +131,8 @@ fn catalogue_6_sphere_cavity() {
                 }
             }
         }
-        let area = |list: &[[DVec3; 3]]| -> f64 {
-            list.iter().map(|[a, b, c]| 0.5 * (*b - *a).cross(*c - *a).length()).sum()
-        };
+        let area =
+            |list: &[[DVec3; 3]]| -> f64 { list.iter().map(|[a, b, c]| 0.5 * (*b - *a).cross(*c - *a).length()).sum() };
         let (dark, lamp) = (area(&lists[0]), area(&lists[1]));
         scene.add_triangles("dark", 0, &lists[0]);
         scene.add_triangles("lamp", 1, &lists[1]);
@@ -219,9 +218,7 @@ fn catalogue_16_area_source() {
     scene.materials.push(matte("lamp", [0.0; 3], [1000.0; 3]));
     let lamp = [[1.5, 1.5, 2.999_999], [1.5, 2.5, 2.999_999], [2.5, 2.5, 2.999_999], [2.5, 1.5, 2.999_999]];
     scene.add_quad("lamp", 1, lamp.map(DVec3::from));
-    for (points, normal, results) in
-        [("floor_points", DVec3::Z, "floor_lx"), ("wall_points", DVec3::X, "wall_lx")]
-    {
+    for (points, normal, results) in [("floor_points", DVec3::Z, "floor_lx"), ("wall_points", DVec3::X, "wall_lx")] {
         let places: Vec<_> = given[points].as_array().unwrap().iter().map(|p| (point(p), normal)).collect();
         let expected = numbers(&case["results"][results]);
         for (e, exact) in illuminance(&scene, &places, 0.01).iter().zip(expected) {

@@ -255,7 +255,11 @@ impl Scene {
             if bad > 0 {
                 faults.error(of(object), format!("{bad} vertices are not finite"), "export the model again");
             }
-            let flat = object.triangles.clone().filter(|&t| self.area(t).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater)).count();
+            let flat = object
+                .triangles
+                .clone()
+                .filter(|&t| self.area(t).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater))
+                .count();
             if flat > 0 {
                 faults.error(of(object), format!("{flat} triangles have no area"), "remove them");
             }

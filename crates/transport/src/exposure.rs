@@ -71,7 +71,7 @@ impl Exposure {
             .map(|chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(n);
                 let masks = range.clone().filter_map(|i| examine(tracer, mesh, elements, i as u32));
-                let masks: Vec<_> = masks.map(|(i, mask)| (i, mask)).collect();
+                let masks: Vec<_> = masks.collect();
                 let so_far = done.fetch_add(range.len(), std::sync::atomic::Ordering::Relaxed) + range.len();
                 progress.step(so_far, n).then_some(masks).ok_or(Stopped)
             })

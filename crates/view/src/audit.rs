@@ -14,6 +14,9 @@ use serde::Serialize;
 /// Standard normal quantile of the one-sided 95 % bound.
 const ONE_SIDED_95: f64 = 1.645;
 
+/// Fewer points than this get no bound: the spread of heavy-tailed products cannot be told from a handful.
+pub const FEWEST_POINTS: usize = 30;
+
 /// What the audit found.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Audit {
@@ -127,8 +130,13 @@ fn judge(sums: &[[f64; 2]], h: &[Bands], paths: u32) -> Audit {
         points: sums.len(),
         paths,
         error: root(squared_error),
-        upper: root(squared_error.max(0.0) + ONE_SIDED_95 * noise),
-        lower: root(squared_error - ONE_SIDED_95 * noise),
+        // A handful of products says nothing of their spread: no bound is better than a false one.
+        upper: if sums.len() < FEWEST_POINTS {
+            f64::INFINITY
+        } else {
+            root(squared_error.max(0.0) + ONE_SIDED_95 * noise)
+        },
+        lower: if sums.len() < FEWEST_POINTS { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise) },
         bias: bias / level.max(f64::MIN_POSITIVE),
         bias_error: deviation(&shift, bias) / level.max(f64::MIN_POSITIVE),
         mean_illuminance: level,

@@ -43,10 +43,10 @@ impl Field {
 
         // The coarsest division along each shared edge.
         let mut coarsest: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-        for t in 0..triangles {
+        for (t, &k) in division.iter().enumerate() {
             for e in 0..3 {
-                let entry = coarsest.entry(edge_key(mesh, t, e)).or_insert(division[t]);
-                *entry = (*entry).min(division[t]);
+                let entry = coarsest.entry(edge_key(mesh, t, e)).or_insert(k);
+                *entry = (*entry).min(k);
             }
         }
 

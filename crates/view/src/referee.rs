@@ -40,9 +40,9 @@ impl<'a> Referee<'a> {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         let mut emitters = Vec::new();
         let mut cumulative = Vec::new();
-        let mut emitter_of = vec![[0; 2]; mesh.triangles.len()];
+        let mut emitter_of = vec![[0u32; 2]; mesh.triangles.len()];
         let mut running = 0.0;
-        for t in 0..mesh.triangles.len() {
+        for (t, numbers) in emitter_of.iter_mut().enumerate() {
             let material = scene.material(mesh.source[t] as usize);
             if !material.emits() {
                 continue;
@@ -58,7 +58,7 @@ impl<'a> Referee<'a> {
                 cumulative.push(running);
                 let normal = sign * mesh.normal(t);
                 emitters.push(Emitter { triangle: t as u32, normal, area: mesh.area(t), share: power });
-                emitter_of[t][side as usize] = emitters.len() as u32;
+                numbers[side as usize] = emitters.len() as u32;
             }
         }
         cumulative.iter_mut().for_each(|c| *c /= running);

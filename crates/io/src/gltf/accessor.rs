@@ -1,7 +1,7 @@
 //! Numbers out of a glTF's buffers (glTF 2.0, 3.6): strided, sparse, normalised, quantised, and never trusted.
 //!
 //! Every size is checked against the bytes that are there before memory is taken; an accessor without bytes (all
-//! zeros, or sparse over zeros) may have at most [`MAX_ZERO_FILLED`] components.
+//! zeros, or sparse over zeros) may have at most `MAX_ZERO_FILLED` components.
 
 use super::Document;
 use super::json::{list, shown, text, whole};
