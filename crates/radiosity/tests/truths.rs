@@ -105,8 +105,8 @@ fn catalogue_5_white_furnace() {
 fn catalogue_6_sphere_cavity() {
     let mut worst_before = f64::INFINITY;
     for steps in [4, 8, 16] {
-        let mut scene = Scene::default();
-        scene.materials = vec![matte("dark", [0.5; 3], [0.0; 3]), matte("lamp", [0.5; 3], [1.0; 3])];
+        let materials = vec![matte("dark", [0.5; 3], [0.0; 3]), matte("lamp", [0.5; 3], [1.0; 3])];
+        let mut scene = Scene { materials, ..Scene::default() };
         let mut lists = [Vec::new(), Vec::new()];
         for face in 0..8 {
             let sign = |bit: u32| if face >> bit & 1 == 0 { 1.0 } else { -1.0 };

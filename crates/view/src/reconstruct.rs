@@ -228,8 +228,7 @@ mod tests {
     fn two_quads(double_sided: bool) -> (Scene, Mesh) {
         let mut scene = Scene::default();
         scene.materials.push(Material { double_sided, ..Material::default() });
-        let quad =
-            |x: f64, w: f64| [[x, 0., 0.], [x + w, 0., 0.], [x + w, 1., 0.], [x, 1., 0.]].map(|p| DVec3::from(p));
+        let quad = |x: f64, w: f64| [[x, 0., 0.], [x + w, 0., 0.], [x + w, 1., 0.], [x, 1., 0.]].map(DVec3::from);
         scene.add_quad("large", 0, quad(0.0, 3.0));
         scene.add_quad("small", 0, quad(3.0, 0.3));
         let mesh = Mesh::new(&scene);
