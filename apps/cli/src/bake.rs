@@ -1,14 +1,14 @@
 //! `radiosity bake`: solve, write the lit model, a picture, a report.
 
-use crate::input::{self, Input, SceneArguments, SolveArguments};
+use crate::input::{self, Input, PictureArguments, SceneArguments, SolveArguments};
 use crate::progress::Progress;
 use crate::report::{LightmapReport, Report, peak_memory_mb};
 use crate::{Failure, Global, html, output};
 use clap::{Args, ValueEnum};
-use radiosity::io::gltf_out::{Encoding, Light, PageImage, Style, write_lit};
+use radiosity::io::gltf_out::{Encoding, PageImage, Style, write_lit};
 use radiosity::io::image_out::{encode_exr, encode_png};
 use radiosity::view::picture::srgb;
-use radiosity::{BakeOptions, Baked, Lightmap, Mesh, Picture, RenderOptions, Tracer, luminance};
+use radiosity::{Baked, Lightmap, Mesh, Picture, RenderOptions, Tracer, luminance};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
@@ -42,15 +42,8 @@ pub struct Arguments {
     /// A report, .json or .html; may be given twice.
     #[arg(long, value_name = "OUT.html")]
     report: Vec<PathBuf>,
-    /// Camera of the picture, by name or number.
-    #[arg(long)]
-    camera: Option<String>,
-    /// Size of the picture.
-    #[arg(long, value_parser = input::size, value_name = "WxH")]
-    size: Option<(u32, u32)>,
-    /// Exposure of the picture and of --unlit: log2 of the factor from cd/m² to display; chosen by itself otherwise.
-    #[arg(long, value_name = "EV", allow_hyphen_values = true)]
-    exposure: Option<f64>,
+    #[command(flatten)]
+    picture: PictureArguments,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -77,22 +70,15 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let input = input::load(&arguments.scene, global, progress)?;
     let mesh = Mesh::new(&input.scene);
     let tracer = Tracer::new(&input.scene, &mesh);
-    let camera = output::camera(&input.scene, &tracer, arguments.camera.as_deref())?;
+    let camera = output::camera(&input.scene, &tracer, arguments.picture.camera.as_deref())?;
 
-    let options = BakeOptions {
-        error: arguments.solve.error,
-        solve: arguments.solve.options(),
-        rounds: arguments.solve.rounds,
-        seed: arguments.solve.seed,
-        ..BakeOptions::default()
-    };
-    let baked = radiosity::bake(&tracer, &options, progress)?;
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
     let mut outputs = Vec::new();
 
     // Pictures first: their exposure serves the unlit model as well.
     let wants_picture = arguments.image.is_some() || !arguments.report.is_empty() || arguments.unlit;
     let picture = if wants_picture {
-        let (width, height) = output::picture_size(&camera, arguments.size);
+        let (width, height) = output::picture_size(&camera, arguments.picture.size);
         let render = RenderOptions { width, height, ..RenderOptions::default() };
         Some(radiosity::render(&baked.solution, &baked.field, &camera, &render, progress)?)
     } else {
@@ -105,7 +91,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         let style = if arguments.vertices {
             Style::Vertices
         } else {
-            let exposure = arguments.exposure.or(picture.as_ref().map(Picture::exposure)).unwrap_or(0.0);
+            let exposure = arguments.picture.exposure.or(picture.as_ref().map(Picture::exposure)).unwrap_or(0.0);
             Style::Unlit { exposure: exposure.exp2() as f32 }
         };
         write_lit(&input.scene, input.document.as_ref(), &primitives, &style, &target).map_err(Failure::work)?;
@@ -122,7 +108,6 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             output::write(&beside, &encode_exr(size[0], size[1], texels).map_err(Failure::work)?)?;
             outputs.push(beside.display().to_string());
         }
-        debug_assert!(map.primitives.iter().all(|p| matches!(p.light, Light::Lightmap { .. })));
         let style = Style::Lightmap { pages, encoding, exposure: 1.0 };
         write_lit(&input.scene, input.document.as_ref(), &map.primitives, &style, &target).map_err(Failure::work)?;
         lightmap_report = Some(account(&map));
@@ -130,13 +115,13 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.insert(0, target.display().to_string());
 
     if let (Some(path), Some(picture)) = (&arguments.image, &picture) {
-        output::write_picture(path, picture, arguments.exposure)?;
+        output::write_picture(path, picture, arguments.picture.exposure)?;
         outputs.push(path.display().to_string());
     }
     outputs.extend(arguments.report.iter().map(|p| p.display().to_string()));
     let report = report(&input, &mesh, arguments, &baked, lightmap_report, outputs, progress);
     for path in &arguments.report {
-        write_report(path, &report, picture.as_ref(), arguments.exposure)?;
+        write_report(path, &report, picture.as_ref(), arguments.picture.exposure)?;
     }
     tell(&report, global, progress);
     Ok(())
@@ -205,8 +190,7 @@ fn report(
         element_size: solution.element_size,
         buried: [solution.exposure.buried, solution.exposure.partial],
         rays_per_element: solution.rays(),
-        // Every row has M entries of weight 1/M: its sum is one by construction, before any repair.
-        raw_closure: 0.0,
+        raw_closure: solution.raw_closure(),
         solver: solution.info.clone(),
         balance: solution.balance(),
         illuminance: [least, mean as f32, most],

@@ -53,6 +53,32 @@ impl SolveArguments {
         let default = radiosity::SolveOptions::default();
         radiosity::SolveOptions { element_size: self.element_size, memory: self.memory, ..default }
     }
+
+    /// As the library takes them to light surfaces.
+    pub fn bake(&self) -> radiosity::BakeOptions {
+        let default = radiosity::BakeOptions::default();
+        radiosity::BakeOptions {
+            error: self.error,
+            solve: self.options(),
+            rounds: self.rounds,
+            seed: self.seed,
+            ..default
+        }
+    }
+}
+
+/// How to take a picture.
+#[derive(Args, Clone, Debug)]
+pub struct PictureArguments {
+    /// Camera, by name or number; the first, or one placed by the program, by default.
+    #[arg(long)]
+    pub camera: Option<String>,
+    /// Size; by the camera's aspect if left out.
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    pub size: Option<(u32, u32)>,
+    /// Exposure: log2 of the factor from cd/m² to display; chosen by itself if left out.
+    #[arg(long, value_name = "EV", allow_hyphen_values = true)]
+    pub exposure: Option<f64>,
 }
 
 /// A scene that has been read.

@@ -1,10 +1,10 @@
 //! `radiosity render`: a picture from the solution.
 
-use crate::input::{self, SceneArguments, SolveArguments};
+use crate::input::{self, PictureArguments, SceneArguments, SolveArguments};
 use crate::progress::Progress;
 use crate::{Failure, Global, output};
 use clap::Args;
-use radiosity::{BakeOptions, Mesh, RenderOptions, Tracer};
+use radiosity::{Mesh, RenderOptions, Tracer};
 use std::path::PathBuf;
 
 /// Arguments of `render`.
@@ -17,15 +17,8 @@ pub struct Arguments {
     /// The picture: .png (tone-mapped) or .exr (cd/m²).
     #[arg(short, long, value_name = "IMG.png")]
     output: PathBuf,
-    /// Camera, by name or number; the first, or one placed by the program, by default.
-    #[arg(long)]
-    camera: Option<String>,
-    /// Size; by the camera's aspect if left out.
-    #[arg(long, value_parser = input::size, value_name = "WxH")]
-    size: Option<(u32, u32)>,
-    /// Exposure: log2 of the factor from cd/m² to display; chosen by itself if left out.
-    #[arg(long, value_name = "EV", allow_hyphen_values = true)]
-    exposure: Option<f64>,
+    #[command(flatten)]
+    picture: PictureArguments,
 }
 
 /// Runs the verb.
@@ -34,23 +27,16 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let input = input::load(&arguments.scene, global, progress)?;
     let mesh = Mesh::new(&input.scene);
     let tracer = Tracer::new(&input.scene, &mesh);
-    let camera = output::camera(&input.scene, &tracer, arguments.camera.as_deref())?;
-    let options = BakeOptions {
-        error: arguments.solve.error,
-        solve: arguments.solve.options(),
-        rounds: arguments.solve.rounds,
-        seed: arguments.solve.seed,
-        ..BakeOptions::default()
-    };
-    let baked = radiosity::bake(&tracer, &options, progress)?;
-    let (width, height) = output::picture_size(&camera, arguments.size);
+    let camera = output::camera(&input.scene, &tracer, arguments.picture.camera.as_deref())?;
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
+    let (width, height) = output::picture_size(&camera, arguments.picture.size);
     let render = RenderOptions { width, height, ..RenderOptions::default() };
     let picture = radiosity::render(&baked.solution, &baked.field, &camera, &render, progress)?;
-    output::write_picture(&arguments.output, &picture, arguments.exposure)?;
+    output::write_picture(&arguments.output, &picture, arguments.picture.exposure)?;
     if global.json {
         let result = serde_json::json!({
             "event": "result", "achieved": baked.achieved, "audit": baked.audit, "width": width, "height": height,
-            "exposure": arguments.exposure.unwrap_or_else(|| picture.exposure()), "seconds": progress.seconds(),
+            "exposure": arguments.picture.exposure.unwrap_or_else(|| picture.exposure()), "seconds": progress.seconds(),
         });
         println!("{result}");
     } else {

@@ -324,6 +324,12 @@ impl<'a> Solution<'a> {
         (noise / signal.max(f64::MIN_POSITIVE)).sqrt()
     }
 
+    /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it.
+    pub fn raw_closure(&self) -> f64 {
+        let ones = vec![[1f32; 4]; self.values.len()];
+        self.table.rows_mean(&ones).iter().fold(0f64, |worst, sum| worst.max((f64::from(sum[0]) - 1.0).abs()))
+    }
+
     /// Where the light goes, from the rows as they are.
     pub fn balance(&self) -> Balance {
         let n = self.elements.len();

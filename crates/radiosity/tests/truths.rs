@@ -295,6 +295,18 @@ fn no_light_leaks_through_walls_of_zero_thickness() {
     }
 }
 
+/// One point alone once came back as certified with error and bound of zero.
+#[test]
+fn a_single_point_is_not_certified_for_nothing() {
+    let scene = radiosity::cornell_box();
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let options = MeasureOptions { error: 0.05, ..MeasureOptions::default() };
+    let measured = measure(&tracer, &[(DVec3::new(0.1, 0.0, 0.1), DVec3::Y)], &options, &()).unwrap();
+    assert!(measured.audit.upper > 0.0 && measured.audit.upper.is_finite(), "{:?}", measured.audit);
+    assert_eq!(measured.achieved, measured.audit.upper <= 0.05);
+}
+
 /// The same bytes on one thread and on two.
 #[test]
 fn the_answer_does_not_depend_on_the_number_of_threads() {

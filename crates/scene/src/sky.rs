@@ -1,6 +1,6 @@
 //! What a ray that escapes the scene sees: the luminance of the sky by direction.
 
-use crate::{Bands, Texture};
+use crate::Bands;
 use glam::DVec3;
 
 /// The luminance of everything outside the scene.
@@ -141,13 +141,6 @@ impl SkyPatches {
 fn horizon(up: DVec3) -> [DVec3; 2] {
     let north = if up.y.abs() > 0.5 { -DVec3::Z } else { DVec3::Y };
     [north, north.cross(up)]
-}
-
-impl Texture {
-    /// Whether every texel is opaque.
-    pub fn is_opaque(&self) -> bool {
-        self.texels.iter().all(|t| t[3] == 255)
-    }
 }
 
 #[cfg(test)]

@@ -51,6 +51,11 @@ static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
 });
 
 impl Texture {
+    /// Whether every texel is opaque.
+    pub fn is_opaque(&self) -> bool {
+        self.texels.iter().all(|t| t[3] == 255)
+    }
+
     /// Bilinear look-up at `uv`. Colour is decoded from sRGB when `srgb`; alpha never is. All in 0..1.
     pub fn sample(&self, uv: DVec2, wrap: [Wrap; 2], srgb: bool) -> [f32; 4] {
         let (w, h) = (i64::from(self.width), i64::from(self.height));

@@ -4,7 +4,7 @@
 //! converge. Entries with ρ = 0 are known beforehand (B = E there) and kept fixed. Hestenes and Stiefel 1952;
 //! all bands run side by side with their own step lengths.
 
-use crate::{Go, Info, Params, Response, SolveError, Transport, bound, residual};
+use crate::{Go, Info, Params, Response, SolveError, Transport, bound, is_done, residual};
 
 /// Solves B = E + R F B in place; `b` holds the start and the result. `step` sees each iterate.
 ///
@@ -48,14 +48,8 @@ pub fn conjugate_gradient<T: Transport>(
     let mut rr = dot(&r, &r);
     loop {
         info.bound = bound(response, &r);
-        if step(b, &info) == Go::Stop {
-            return Err(SolveError::Stopped);
-        }
-        if info.residual.iter().all(|x| *x <= params.tolerance) {
+        if is_done(b, &info, params, &mut step)? {
             return Ok(info);
-        }
-        if info.steps >= params.max_steps {
-            return Err(SolveError::NotConverged { info, asked: params.tolerance });
         }
 
         // A p = p − R F p.

@@ -6,7 +6,7 @@
 //! each part of the scene that sees no other (a two-level method; Nicolaides 1987). One vector for all rooms together
 //! would pour a part of a bright room's error into a dark one. On a closed cube at ρ = 0.95 that takes 20 sweeps instead of 269.
 
-use crate::{Go, Info, Params, Response, SolveError, Space, Transport, bound, residual};
+use crate::{Go, Info, Params, Response, SolveError, Space, Transport, bound, is_done, residual};
 
 /// Solves B = E + R F B in place; `b` holds the start (warm or zero) and the result. `step` sees each iterate.
 ///
@@ -48,14 +48,8 @@ pub fn jacobi<T: Transport>(
     loop {
         info.residual = residual(space, response, (e, b, &h), &mut r);
         info.bound = bound(response, &r);
-        if step(b, &info) == Go::Stop {
-            return Err(SolveError::Stopped);
-        }
-        if info.residual.iter().all(|x| *x <= params.tolerance) {
+        if is_done(b, &info, params, &mut step)? {
             return Ok(info);
-        }
-        if info.steps >= params.max_steps {
-            return Err(SolveError::NotConverged { info, asked: params.tolerance });
         }
 
         // Sweep: B + r is E + R F B.

@@ -87,6 +87,25 @@ fn residual(
     own.iter().zip(scale).map(|(r, s)| if *r == 0.0 { 0.0 } else { (r / s.max(f64::MIN_POSITIVE)).sqrt() }).collect()
 }
 
+/// Shows the caller an iterate and says whether the solver is done with it.
+fn is_done(
+    b: &[f64],
+    info: &Info,
+    params: &Params,
+    step: &mut impl FnMut(&[f64], &Info) -> Go,
+) -> Result<bool, SolveError> {
+    if step(b, info) == Go::Stop {
+        return Err(SolveError::Stopped);
+    }
+    if info.residual.iter().all(|x| *x <= params.tolerance) {
+        return Ok(true);
+    }
+    if info.steps >= params.max_steps {
+        return Err(SolveError::NotConverged { info: info.clone(), asked: params.tolerance });
+    }
+    Ok(false)
+}
+
 /// The guaranteed bound ‖r‖∞/(1 − ρ_max) of each band.
 fn bound(response: &(impl Response + ?Sized), residual: &[f64]) -> Vec<f64> {
     let bands = response.bands();

@@ -146,6 +146,9 @@ fn running_out_of_steps_is_an_error_with_the_residual() {
     let e = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let error = jacobi(&cube(), &response(0.9, 6), &e, &mut b, &params, |_, _| Go::On).unwrap_err();
     assert!(matches!(&error, SolveError::NotConverged { info, .. } if info.residual[0] > 1e-12), "{error}");
+    let open = DiffuseResponse { reciprocal_area: None, ..response(0.5, 6) };
+    let refused = conjugate_gradient(&cube(), &open, &e, &mut b, &params, |_, _| Go::On).unwrap_err();
+    assert!(matches!(refused, SolveError::NotApplicable(_)));
     let stop = jacobi(&cube(), &response(0.9, 6), &e, &mut b, &params, |_, _| Go::Stop).unwrap_err();
     assert!(matches!(stop, SolveError::Stopped));
 }

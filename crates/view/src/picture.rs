@@ -74,7 +74,9 @@ impl ViewRays {
                 pixel[band] += seen.response[band] * e[band];
             }
         }
-        Picture { width: self.width, height: self.height, pixels }
+        let mut surfaces = vec![false; pixels.len()];
+        self.seen.iter().for_each(|seen| surfaces[seen.pixel as usize] = true);
+        Picture { width: self.width, height: self.height, pixels, surfaces }
     }
 }
 
@@ -155,13 +157,16 @@ pub struct Picture {
     pub height: u32,
     /// Luminances.
     pub pixels: Vec<Bands>,
+    /// Whether a pixel shows a surface; sky and void are not metered.
+    pub surfaces: Vec<bool>,
 }
 
 impl Picture {
     /// The exposure (log2 of the factor) that puts the picture's median surface luminance at 18 % grey, but keeps
     /// nine tenths of the picture below 80 % so that bright rooms are not washed out.
     pub fn exposure(&self) -> f64 {
-        let mut lit: Vec<f32> = self.pixels.iter().map(|p| luminance(*p)).filter(|l| *l > 0.0).collect();
+        let metered = self.pixels.iter().zip(&self.surfaces).filter(|(_, surface)| **surface);
+        let mut lit: Vec<f32> = metered.map(|(p, _)| luminance(*p)).filter(|l| *l > 0.0).collect();
         if lit.is_empty() {
             return 0.0;
         }
@@ -234,10 +239,13 @@ mod tests {
 
     #[test]
     fn a_grey_picture_is_exposed_to_middle_grey() {
-        let picture = Picture { width: 4, height: 4, pixels: vec![[300.0; 3]; 16] };
+        // The upper half shows a bright sky, which must not count.
+        let pixels = (0..16).map(|i| if i < 8 { [1e5; 3] } else { [300.0; 3] }).collect();
+        let surfaces = (0..16).map(|i| i >= 8).collect();
+        let picture = Picture { width: 4, height: 4, pixels, surfaces };
         let factor = picture.exposure().exp2() * 300.0;
         assert!((factor - 0.24).abs() < 1e-3, "{factor}");
         let mapped = picture.tone_mapped(picture.exposure());
-        assert!(mapped.iter().all(|p| (120..=140).contains(&p[0])), "{:?}", mapped[0]);
+        assert!(mapped[8..].iter().all(|p| (120..=140).contains(&p[0])), "{:?}", mapped[8]);
     }
 }
