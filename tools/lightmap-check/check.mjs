@@ -3,20 +3,18 @@
 // POINTS.csv has the columns x,y,z,nx,ny,nz (metres, any order); the output has irradiance_r, irradiance_g and
 // irradiance_b in lx, one row per point. The model is loaded with GLTFLoader and a small MOZ_lightmap plugin and drawn
 // on white; pixels are read back from a float target. --z-up: the points' zenith is +Z. --exposure: of the unlit style.
-import { createServer } from 'node:http';
-import { mkdtemp, readFile, rm } from 'node:fs/promises';
-import { tmpdir } from 'node:os';
-import { dirname, extname, join, normalize } from 'node:path';
-import { fileURLToPath } from 'node:url';
+// --reach: from how far the points are looked at; by default 1e-4 of the model's size. A point where nothing is drawn
+// within a tenth of that gives NaN.
+import { readFile } from 'node:fs/promises';
 import { parseArgs } from 'node:util';
-import { chromium } from 'playwright-core';
+import { open } from './viewer.mjs';
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
   options: {
     'z-up': { type: 'boolean', default: false },
     exposure: { type: 'string', default: '1' },
-    reach: { type: 'string', default: '0.001' },
+    reach: { type: 'string' },
     chromium: { type: 'string', default: '/usr/bin/chromium' },
   },
 });
@@ -40,45 +38,11 @@ const points = lines.map((line) => {
   return values['z-up'] ? [x, z, -y, nx, nz, -ny] : [x, y, z, nx, ny, nz];
 });
 
-const here = dirname(fileURLToPath(import.meta.url));
-const three = join(here, '..', 'node_modules', 'three');
-const types = { '.html': 'text/html', '.js': 'text/javascript', '.glb': 'model/gltf-binary' };
-const server = createServer(async (request, response) => {
-  const path = normalize(new URL(request.url, 'http://localhost').pathname);
-  const file = path === '/' ? join(here, 'page.html')
-    : path === '/model.glb' ? model
-      : path.startsWith('/three/') ? join(three, path.slice('/three/'.length)) : null;
-  try {
-    const body = await readFile(file);
-    response.writeHead(200, { 'content-type': types[extname(file)] ?? 'application/octet-stream' }).end(body);
-  } catch {
-    response.writeHead(404).end();
-  }
-});
-await new Promise((done) => server.listen(0, '127.0.0.1', done));
-
-const profile = await mkdtemp(join(tmpdir(), 'lightmap-check-'));
-const browser = await chromium.launchPersistentContext(profile, {
-  executablePath: values.chromium,
-  headless: true,
-  args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run',
-    '--disable-background-networking', '--disable-component-update', '--disable-sync'],
-});
-let failed = false;
+const viewer = await open(model, { executablePath: values.chromium });
 try {
-  const page = await browser.newPage();
-  page.on('console', (message) => {
-    if (message.type() === 'error') console.error(`page: ${message.text()}`);
-  });
-  page.on('pageerror', (error) => { failed = true; console.error(`page: ${error}`); });
-  await page.goto(`http://127.0.0.1:${server.address().port}/`);
-  await page.waitForFunction(() => window.ready === true);
-  const rows = await page.evaluate(([points, reach]) => window.measure(points, reach), [points, Number(values.reach)]);
+  const rows = await viewer.measure(points, { reach: values.reach && Number(values.reach) });
   console.log('irradiance_r,irradiance_g,irradiance_b');
   for (const row of rows) console.log(row.map((v) => (v / exposure).toPrecision(7)).join(','));
 } finally {
-  await browser.close();
-  server.close();
-  await rm(profile, { recursive: true, force: true });
+  await viewer.close();
 }
-process.exitCode = failed ? 1 : 0;

@@ -1,14 +1,17 @@
 //! `radiosity bake`: solve, write the lit model, a picture, a report.
 
-use crate::input::{self, Input, PictureArguments, SceneArguments, SolveArguments};
+use crate::html::{self, Plate};
+use crate::input::{self, PictureArguments, SceneArguments, SolveArguments};
+use crate::output::{Outputs, print};
 use crate::progress::Progress;
-use crate::report::{LightmapReport, Report, peak_memory_mb};
-use crate::{Failure, Global, html, output};
+use crate::report::{LightmapReport, Report};
+use crate::views::{self, View};
+use crate::{Failure, Global, numbers};
 use clap::{Args, ValueEnum};
-use radiosity::io::gltf_out::{Encoding, PageImage, Style, write_lit};
+use radiosity::io::gltf_out::{Encoding, PageImage, Style, lit_glb};
 use radiosity::io::image_out::{encode_exr, encode_png};
 use radiosity::view::picture::srgb;
-use radiosity::{Baked, Lightmap, Mesh, Picture, RenderOptions, Tracer, luminance};
+use radiosity::{Mesh, Tracer};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
@@ -18,14 +21,15 @@ pub struct Arguments {
     scene: SceneArguments,
     #[command(flatten)]
     solve: SolveArguments,
-    /// The lit model; SCENE-lit.glb in the current folder by default.
+    /// The lit model; SCENE-lit.glb in the current folder by default. Pages of a lightmap are written beside it as
+    /// OpenEXR as well, OUT.lightmap0.exr and so on (lx).
     #[arg(short, long, value_name = "OUT.glb")]
     output: Option<PathBuf>,
     /// Texels per metre of the lightmap; about 200 000 texels in all by default.
-    #[arg(long, value_name = "N", conflicts_with_all = ["vertices", "unlit"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["vertices", "unlit"], value_parser = numbers::density)]
     texels_per_metre: Option<f64>,
     /// Largest width and height of a lightmap page.
-    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(16..=16384))]
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_atlas: u32,
     /// How texels are stored: sRGB, or linear for older readers.
     #[arg(long, value_enum, default_value_t = TexelEncoding::Srgb)]
@@ -55,76 +59,80 @@ enum TexelEncoding {
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let target = output_path(arguments);
-    output::check(&target, &["glb"])?;
+    let mut outputs = Outputs::new(&arguments.scene.files());
+    outputs.promise(&target, &["glb"])?;
+    if !(arguments.vertices || arguments.unlit) {
+        outputs.promise(&page_path(&target, 0), &["exr"])?;
+    }
     for path in &arguments.report {
-        output::check(path, &["json", "html"])?;
+        outputs.promise(path, &["json", "html"])?;
     }
     if let Some(path) = &arguments.image {
-        output::check(path, &["png", "exr"])?;
+        outputs.promise(path, &["png", "exr"])?;
     }
-    if let Some(density) = arguments.texels_per_metre
-        && !(density.is_finite() && density > 0.0)
-    {
-        return Err(Failure::input("--texels-per-metre: use a number above 0"));
-    }
+    progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
     let mesh = Mesh::new(&input.scene);
     let tracer = Tracer::new(&input.scene, &mesh);
-    let camera = output::camera(&input.scene, &tracer, arguments.picture.camera.as_deref())?;
+    let camera = views::camera(&input.scene, &tracer, arguments.picture.camera.as_deref())?;
 
+    progress.parts();
     let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
-    let mut outputs = Vec::new();
 
     // Pictures first: their exposure serves the unlit model as well.
-    let wants_picture = arguments.image.is_some() || !arguments.report.is_empty() || arguments.unlit;
-    let picture = if wants_picture {
-        let (width, height) = output::picture_size(&camera, arguments.picture.size);
-        let render = RenderOptions { width, height, ..RenderOptions::default() };
-        Some(radiosity::render(&baked.solution, &baked.field, &camera, &render, progress)?)
-    } else {
-        None
-    };
+    progress.part("pictures");
+    let wants_view = arguments.image.is_some() || !arguments.report.is_empty() || arguments.unlit;
+    let size = views::picture_size(&camera, arguments.picture.size);
+    let view = if wants_view { Some(View::new(&baked, &camera, size, progress)?) } else { None };
+    let exposure = arguments.picture.exposure.or(view.as_ref().map(|v| v.picture.exposure())).unwrap_or(0.0);
+    let mut written: Vec<&Path> = Vec::new();
+    if let (Some(path), Some(view)) = (&arguments.image, &view) {
+        outputs.stage(path, &views::encode(path, &view.picture, exposure)?)?;
+        written.push(path);
+    }
 
-    let mut lightmap_report = None;
-    if arguments.vertices || arguments.unlit {
+    let (mut pages, mut lightmap) = (Vec::new(), None);
+    let model = if arguments.vertices || arguments.unlit {
+        progress.part("vertex light");
         let primitives = radiosity::vertex_light(&baked, progress)?;
-        let style = if arguments.vertices {
-            Style::Vertices
-        } else {
-            let exposure = arguments.picture.exposure.or(picture.as_ref().map(Picture::exposure)).unwrap_or(0.0);
-            Style::Unlit { exposure: exposure.exp2() as f32 }
+        let style = match arguments.vertices {
+            true => Style::Vertices,
+            false => Style::Unlit { exposure: exposure.exp2() as f32 },
         };
-        write_lit(&input.scene, input.document.as_ref(), &primitives, &style, &target).map_err(Failure::work)?;
+        lit_glb(&input.scene, input.document.as_ref(), &primitives, &style)
     } else {
+        progress.part("lightmap");
         let map = radiosity::lightmap(&baked, arguments.texels_per_metre, arguments.max_atlas, progress)?;
+        lightmap = Some(LightmapReport::new(&map));
         let encoding = match arguments.lightmap_encoding {
             TexelEncoding::Srgb => Encoding::Srgb,
             TexelEncoding::Linear => Encoding::Linear,
         };
-        let mut pages = Vec::new();
+        let mut images = Vec::new();
         for (page, (size, texels)) in map.pages.iter().zip(&map.irradiance).enumerate() {
-            pages.push(page_image(*size, texels, encoding)?);
-            let beside = target.with_extension(format!("lightmap{page}.exr"));
-            output::write(&beside, &encode_exr(size[0], size[1], texels).map_err(Failure::work)?)?;
-            outputs.push(beside.display().to_string());
+            images.push(page_image(*size, texels, encoding)?);
+            let beside = page_path(&target, page);
+            outputs.stage(&beside, &encode_exr(size[0], size[1], texels).map_err(Failure::work)?)?;
+            pages.push(beside);
         }
-        let style = Style::Lightmap { pages, encoding, exposure: 1.0 };
-        write_lit(&input.scene, input.document.as_ref(), &map.primitives, &style, &target).map_err(Failure::work)?;
-        lightmap_report = Some(account(&map));
-    }
-    outputs.insert(0, target.display().to_string());
+        let style = Style::Lightmap { pages: images, encoding, exposure: 1.0 };
+        lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style)
+    };
+    progress.part("writing");
+    outputs.stage(&target, &model.map_err(|error| Failure::work(format!("{}: {error}", target.display())))?)?;
+    let files = std::iter::once(target.as_path()).chain(pages.iter().map(PathBuf::as_path)).chain(written);
+    let files: Vec<&Path> = files.chain(arguments.report.iter().map(PathBuf::as_path)).collect();
 
-    if let (Some(path), Some(picture)) = (&arguments.image, &picture) {
-        output::write_picture(path, picture, arguments.picture.exposure)?;
-        outputs.push(path.display().to_string());
-    }
-    outputs.extend(arguments.report.iter().map(|p| p.display().to_string()));
-    let report = report(&input, &mesh, arguments, &baked, lightmap_report, outputs, progress);
+    let report = Report::new(&input, &mesh, &arguments.solve, (&baked, view.as_ref()), lightmap, &files, progress);
     for path in &arguments.report {
-        write_report(path, &report, picture.as_ref(), arguments.picture.exposure)?;
+        let text = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+            true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,
+            false => html::page(&report, &plates(view.as_ref(), &camera.name, &report, exposure)?),
+        };
+        outputs.stage(path, text.as_bytes())?;
     }
-    tell(&report, global, progress);
-    Ok(())
+    outputs.commit()?;
+    tell(&report, global, progress)
 }
 
 fn output_path(arguments: &Arguments) -> PathBuf {
@@ -133,6 +141,10 @@ fn output_path(arguments: &Arguments) -> PathBuf {
         let stem = stem.map_or("cornell-box".to_owned(), |s| s.to_string_lossy().into_owned());
         PathBuf::from(format!("{stem}-lit.glb"))
     })
+}
+
+fn page_path(target: &Path, page: usize) -> PathBuf {
+    target.with_extension(format!("lightmap{page}.exr"))
 }
 
 /// A page as 8-bit PNG, scaled by its maximum.
@@ -148,98 +160,50 @@ fn page_image(size: [u32; 2], texels: &[radiosity::Bands], encoding: Encoding) -
     Ok(PageImage { png: encode_png(size[0], size[1], &pixels).map_err(Failure::work)?, intensity })
 }
 
-fn account(map: &Lightmap) -> LightmapReport {
-    LightmapReport {
-        density: map.density,
-        texels: map.texels,
-        pages: map.pages.clone(),
-        seams_before: map.seams[0],
-        seams_after: map.seams[1],
+/// The pictures of a page.
+fn plates(view: Option<&View>, camera: &str, report: &Report, exposure: f64) -> Result<Vec<Plate>, Failure> {
+    let Some(view) = view.map(View::for_page) else { return Ok(Vec::new()) };
+    let ev = format!("{exposure:+.1}").replace('-', "−");
+    let from = if camera.is_empty() { String::new() } else { format!(" Camera “{camera}”.") };
+    let mut plates = vec![Plate {
+        title: "As the eye sees it".to_owned(),
+        note: format!("Luminance, tone-mapped at an exposure of {ev} EV.{from}"),
+        png: views::png(&view.picture, exposure)?,
+        has_scale: false,
+    }];
+    if !report.illuminance.classes.is_empty() {
+        plates.push(Plate {
+            title: "Illuminance".to_owned(),
+            note: "Light that arrives on each surface, lx; so a lamp itself may look dark.".to_owned(),
+            png: view.false_colors(&report.illuminance)?,
+            has_scale: true,
+        });
     }
+    Ok(plates)
 }
 
-fn report(
-    input: &Input,
-    mesh: &Mesh,
-    arguments: &Arguments,
-    baked: &Baked,
-    lightmap: Option<LightmapReport>,
-    outputs: Vec<String>,
-    progress: &Progress,
-) -> Report {
-    let solution = &baked.solution;
-    let exposed = solution.exposed_area();
-    let lux: Vec<f32> = solution.irradiance().iter().map(|e| luminance(*e)).collect();
-    let visible = || lux.iter().zip(&exposed).filter(|(_, a)| **a > 0.0);
-    let area: f64 = exposed.iter().sum();
-    let mean = visible().map(|(e, a)| f64::from(*e) * a).sum::<f64>() / area.max(f64::MIN_POSITIVE);
-    let least = visible().map(|(e, _)| *e).fold(f32::INFINITY, f32::min);
-    let most = visible().map(|(e, _)| *e).fold(0f32, f32::max);
-    Report {
-        program: format!("radiosity {}", env!("CARGO_PKG_VERSION")),
-        scene: input.title.clone(),
-        triangles: input.scene.triangles.len(),
-        materials: input.scene.materials.len(),
-        lights: solution.luminaires.lights.iter().map(|l| l.name().to_owned()).collect(),
-        area: (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum(),
-        asked_error: arguments.solve.error,
-        achieved: baked.achieved,
-        audit: baked.audit.clone(),
-        rounds: baked.rounds.clone(),
-        elements: solution.elements.len(),
-        element_size: solution.element_size,
-        buried: [solution.exposure.buried, solution.exposure.partial],
-        rays_per_element: solution.rays(),
-        raw_closure: solution.raw_closure(),
-        solver: solution.info.clone(),
-        balance: solution.balance(),
-        illuminance: [least, mean as f32, most],
-        stages: baked.stages.all(),
-        seconds: progress.seconds(),
-        threads: rayon::current_num_threads(),
-        peak_memory_mb: peak_memory_mb(),
-        outputs,
-        lightmap,
-        faults: input.faults.clone(),
-    }
-}
-
-fn write_report(path: &Path, report: &Report, picture: Option<&Picture>, exposure: Option<f64>) -> Result<(), Failure> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-        let text = serde_json::to_string_pretty(report).map_err(Failure::work)?;
-        return output::write(path, text.as_bytes());
-    }
-    let mut pictures = Vec::new();
-    if let Some(picture) = picture {
-        pictures.push((report.scene.clone(), output::png(picture, exposure)?));
-    }
-    output::write(path, html::page(report, &pictures).as_bytes())
+/// The result as an event, with the numbers as the report's file has them.
+#[derive(serde::Serialize)]
+struct ResultEvent<'a> {
+    event: &'static str,
+    report: &'a Report,
 }
 
 /// The last word: what was reached and where it is.
-fn tell(report: &Report, global: &Global, progress: &Progress) {
+fn tell(report: &Report, global: &Global, progress: &Progress) -> Result<(), Failure> {
     if global.json {
-        println!("{}", serde_json::json!({ "event": "result", "report": report }));
-        return;
+        let event = ResultEvent { event: "result", report };
+        return print(&serde_json::to_string(&event).map_err(Failure::work)?);
     }
-    let verdict = if report.achieved { "reached" } else { "NOT reached" };
+    progress.say(&report.error.line());
+    let (solution, light) = (&report.solution, &report.illuminance);
+    let memory = report.peak_memory_mb.map_or(String::new(), |mb| format!(", {mb:.0} MB"));
     progress.say(&format!(
-        "error asked {:.3} %: {verdict}; audit says {:.3} %, at most {:.3} % (95 %)",
-        100.0 * report.asked_error,
-        100.0 * report.audit.error,
-        100.0 * report.audit.upper,
-    ));
-    progress.say(&format!(
-        "{} elements x {} rays, {:.1} s, {:.0} MB; illuminance {:.4} / {:.4} / {:.4} lx (min / mean / max)",
-        report.elements,
-        report.rays_per_element,
-        report.seconds,
-        report.peak_memory_mb,
-        report.illuminance[0],
-        report.illuminance[1],
-        report.illuminance[2],
+        "{} elements x {} rays, {:.1} s{memory}; illuminance {:.4} / {:.4} / {:.4} lx (min / mean / max)",
+        solution.elements, solution.rays_per_element, report.time.seconds, light.least, light.mean, light.largest,
     ));
     for output in &report.outputs {
         progress.say(&format!("wrote {output}"));
     }
+    Ok(())
 }

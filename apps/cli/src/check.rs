@@ -1,9 +1,10 @@
 //! `radiosity check`: what is in a scene, and every fault of it.
 
-use crate::input::{self, SceneArguments};
+use crate::input::{self, Input, SceneArguments};
+use crate::output::print;
 use crate::{Failure, Global};
 use clap::Args;
-use radiosity::{Mesh, Scene};
+use radiosity::{Mesh, PointLightKind};
 use serde_json::{Value, json};
 use std::collections::HashMap;
 
@@ -26,27 +27,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<(), Failure> {
             "harmless for rooms with openings; in a solid it lets light in",
         );
     }
-    let triangles = 0..input.scene.triangles.len();
-    let area: f64 = triangles.map(|t| input.scene.area(t)).sum();
-    if global.json {
-        println!("{}", describe(&input.title, &input.scene, area, open, &input.faults));
-        return Ok(());
-    }
-    println!("{}", input.title);
-    println!("  {} triangles in {} objects, {area} m²", input.scene.triangles.len(), input.scene.objects.len());
-    if let Some([low, high]) = input.scene.bounding_box() {
-        println!("  from {low} to {high} m");
-    }
-    let emitting = input.scene.materials.iter().filter(|m| m.emits()).count();
-    println!("  {} materials, {emitting} of them emit", input.scene.materials.len());
-    println!("  {} lights without area, {} cameras", input.scene.lights.len(), input.scene.cameras.len());
-    for fault in &input.faults.0 {
-        println!("{fault}");
-    }
-    if input.faults.0.is_empty() {
-        println!("  no faults");
-    }
-    Ok(())
+    if global.json { print(&describe(&input, open).to_string()) } else { print(&summary(&input)) }
 }
 
 /// Edges of the welded mesh that only one face has.
@@ -61,7 +42,33 @@ fn open_edges(mesh: &Mesh) -> usize {
     walked.values().filter(|n| **n == 1).count()
 }
 
-fn describe(title: &str, scene: &Scene, area: f64, open: usize, faults: &radiosity::Faults) -> Value {
+fn area(input: &Input) -> f64 {
+    (0..input.scene.triangles.len()).map(|t| input.scene.area(t)).sum()
+}
+
+fn summary(input: &Input) -> String {
+    let scene = &input.scene;
+    let count = |n: usize, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
+    let mut lines = vec![input.title.clone()];
+    let (triangles, objects) = (count(scene.triangles.len(), "triangle"), count(scene.objects.len(), "object"));
+    lines.push(format!("  {triangles} in {objects}, {:.6} m²", area(input)));
+    if let Some([low, high]) = scene.bounding_box() {
+        let size = high - low;
+        lines.push(format!("  {:.4} x {:.4} x {:.4} m, from {low:.4} to {high:.4}", size.x, size.y, size.z));
+    }
+    let emitting = scene.materials.iter().filter(|m| m.emits()).count();
+    lines.push(format!("  {}, {emitting} of them luminous", count(scene.materials.len(), "material")));
+    let (lights, cameras) = (count(scene.lights.len(), "light"), count(scene.cameras.len(), "camera"));
+    lines.push(format!("  {lights} without area, {cameras}"));
+    lines.extend(input.faults.0.iter().map(ToString::to_string));
+    if input.faults.0.is_empty() {
+        lines.push("  no faults".to_owned());
+    }
+    lines.join("\n")
+}
+
+fn describe(input: &Input, open: usize) -> Value {
+    let scene = &input.scene;
     let bounds = scene.bounding_box().map(|b| b.map(|p| p.to_array()));
     let materials: Vec<Value> = scene
         .materials
@@ -71,12 +78,27 @@ fn describe(title: &str, scene: &Scene, area: f64, open: usize, faults: &radiosi
     let lights: Vec<Value> = scene
         .lights
         .iter()
-        .map(|l| json!({ "name": l.name, "kind": format!("{:?}", l.kind), "intensity": l.intensity }))
+        .map(|l| {
+            let (kind, unit) = match l.kind {
+                PointLightKind::Point => ("point", "cd"),
+                PointLightKind::Spot { .. } => ("spot", "cd"),
+                PointLightKind::Directional => ("directional", "lx"),
+            };
+            let (position, direction) = (l.position.to_array(), l.direction.to_array());
+            let mut light = json!({
+                "name": l.name, "kind": kind, "intensity": l.intensity, "unit": unit,
+                "position": position, "direction": direction, "range": l.range,
+            });
+            if let PointLightKind::Spot { inner, outer } = l.kind {
+                light["half_angles"] = json!([inner, outer]);
+            }
+            light
+        })
         .collect();
     let cameras: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
     json!({
-        "scene": title, "triangles": scene.triangles.len(), "area": area, "bounding_box": bounds,
-        "objects": scene.objects.len(), "materials": materials, "lights": lights, "cameras": cameras,
-        "open_edges": open, "faults": faults,
+        "event": "result", "scene": input.title, "triangles": scene.triangles.len(), "area": area(input),
+        "bounding_box": bounds, "objects": scene.objects.len(), "materials": materials, "lights": lights,
+        "cameras": cameras, "open_edges": open, "faults": input.faults,
     })
 }

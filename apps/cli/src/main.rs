@@ -1,23 +1,28 @@
 //! The `radiosity` program: a verb per file.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program talks to its user")]
 
 mod bake;
 mod check;
+mod figures;
 mod html;
+mod illuminance;
 mod input;
 mod measure;
+mod numbers;
 mod output;
 mod progress;
 mod render;
 mod report;
+mod views;
 
 use clap::{Args, Parser, Subcommand};
+use radiosity::Faults;
 use std::process::ExitCode;
 
 /// Diffuse global illumination and radiative exchange by the radiosity method.
 ///
 /// SCENE is a .glb, .gltf or .obj file; without one the built-in Cornell box is used. Lengths in metres, light in
-/// cd/m², lm and lx. Exit code 0: done; 1: the work failed; 2: the call or the input was wrong.
+/// cd/m², lm and lx. Exit code 0: done; 1: the work failed; 2: the call or the input was wrong; 130: interrupted.
+/// Files are written whole and all together at the end; a run that fails or is interrupted leaves none.
 #[derive(Parser)]
 #[command(name = "radiosity", version)]
 struct Cli {
@@ -31,8 +36,8 @@ struct Cli {
 #[derive(Args, Clone, Debug)]
 pub struct Global {
     /// Threads to use; all processors by default. The answer does not depend on it.
-    #[arg(long, global = true, value_name = "N")]
-    threads: Option<usize>,
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Progress and result as lines of JSON on standard output.
     #[arg(long, global = true)]
     json: bool,
@@ -58,57 +63,69 @@ enum Verb {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    if let Some(threads) = cli.global.threads
-        && let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()
-    {
-        eprintln!("error: --threads {threads}: {error}");
-        return ExitCode::from(2);
-    }
-    let monitor = progress::Progress::new(&cli.global);
-    if let Err(error) = monitor.listen_for_interrupts() {
-        eprintln!("warning: Ctrl-C will end the program at once: {error}");
-    }
-    let result = match &cli.verb {
-        Verb::Bake(arguments) => bake::run(arguments, &cli.global, &monitor),
-        Verb::Measure(arguments) => measure::run(arguments, &cli.global, &monitor),
-        Verb::Render(arguments) => render::run(arguments, &cli.global, &monitor),
-        Verb::Check(arguments) => check::run(arguments, &cli.global),
-    };
-    monitor.finish();
+    let progress = progress::Progress::new(&cli.global);
+    let result = work(&cli, &progress);
+    progress.finish();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            let (code, text) = match &failure {
-                Failure::Input(text) => (2, text.clone()),
-                Failure::Work(text) => (1, text.clone()),
-            };
             if cli.global.json {
-                println!("{}", serde_json::json!({ "event": "error", "message": text }));
+                let mut event = serde_json::json!({
+                    "event": "error", "exit_code": failure.code, "message": failure.message,
+                });
+                if !failure.faults.0.is_empty() {
+                    event["faults"] = serde_json::json!(failure.faults);
+                }
+                // Whether or not somebody reads it, standard error and the exit code say the same.
+                let _ = output::print(&event.to_string());
             }
-            eprintln!("{text}");
-            ExitCode::from(code)
+            output::complain(&failure.message);
+            ExitCode::from(failure.code)
         }
+    }
+}
+
+fn work(cli: &Cli, progress: &progress::Progress) -> Result<(), Failure> {
+    if let Some(threads) = cli.global.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        pool.build_global().map_err(|error| Failure::input(format!("--threads {threads}: {error}")))?;
+    }
+    if let Err(error) = progress.listen_for_interrupts() {
+        output::complain(&format!("warning: Ctrl-C may leave temporary files: {error}"));
+    }
+    match &cli.verb {
+        Verb::Bake(arguments) => bake::run(arguments, &cli.global, progress),
+        Verb::Measure(arguments) => measure::run(arguments, &cli.global, progress),
+        Verb::Render(arguments) => render::run(arguments, &cli.global, progress),
+        Verb::Check(arguments) => check::run(arguments, &cli.global),
     }
 }
 
 /// Why a verb failed, and so with which exit code.
 #[derive(Debug)]
-pub enum Failure {
-    /// The call or the input was wrong: 2.
-    Input(String),
-    /// The work failed: 1.
-    Work(String),
+pub struct Failure {
+    code: u8,
+    message: String,
+    faults: Faults,
 }
 
 impl Failure {
     /// A failure of the work.
     pub fn work(error: impl std::fmt::Display) -> Failure {
-        Failure::Work(format!("error: {error}"))
+        Failure { code: 1, message: format!("error: {error}"), faults: Faults::default() }
     }
 
     /// A wrong call or input.
     pub fn input(error: impl std::fmt::Display) -> Failure {
-        Failure::Input(format!("error: {error}"))
+        Failure { code: 2, message: format!("error: {error}"), faults: Faults::default() }
+    }
+}
+
+impl From<radiosity::io::LoadError> for Failure {
+    /// All faults of an input that cannot be used, one to a line.
+    fn from(error: radiosity::io::LoadError) -> Self {
+        // The message has its "error:" already.
+        Failure { code: 2, message: error.to_string(), faults: error.faults().cloned().unwrap_or_default() }
     }
 }
 

@@ -1,10 +1,12 @@
 //! `radiosity measure`: illuminance at points.
 
 use crate::input::{self, SceneArguments, SolveArguments};
+use crate::output::{Outputs, print};
 use crate::progress::Progress;
-use crate::{Failure, Global, output};
+use crate::report::ErrorReport;
+use crate::{Failure, Global};
 use clap::Args;
-use radiosity::{MeasureOptions, Mesh, Tracer, luminance};
+use radiosity::{Mesh, Tracer, luminance};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -25,62 +27,55 @@ pub struct Arguments {
 
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
+    let mut inputs = arguments.scene.files();
+    inputs.push(&arguments.points);
+    let mut outputs = Outputs::new(&inputs);
     if let Some(path) = &arguments.output {
-        output::check(path, &["csv"])?;
+        outputs.promise(path, &["csv"])?;
     }
-    let points = radiosity::io::read_points_csv(&arguments.points).map_err(input::load_failure)?;
+    progress.part("reading");
+    let points = radiosity::io::read_points_csv(&arguments.points)?;
     let input = input::load(&arguments.scene, global, progress)?;
     let mesh = Mesh::new(&input.scene);
     let tracer = Tracer::new(&input.scene, &mesh);
     let places: Vec<_> = points.iter().map(|p| (p.position, p.normal)).collect();
-    let options = MeasureOptions {
-        error: arguments.solve.error,
-        solve: arguments.solve.options(),
-        rounds: arguments.solve.rounds,
-        seed: arguments.solve.seed,
-        ..MeasureOptions::default()
-    };
-    let measured = radiosity::measure(&tracer, &places, &options, progress)?;
+    progress.parts();
+    let measured = radiosity::measure(&tracer, &places, &arguments.solve.measure(), progress)?;
 
-    let mut text = String::from("x,y,z,nx,ny,nz,irradiance_r,irradiance_g,irradiance_b,illuminance_lux\n");
+    let mut text = String::from("x,y,z,nx,ny,nz,irradiance_r,irradiance_g,irradiance_b,illuminance_lux");
     for (point, e) in points.iter().zip(&measured.irradiance) {
         let (p, n) = (point.position, point.normal);
         let [r, g, b] = e;
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{},{},{},{},{},{},{r},{g},{b},{}", p.x, p.y, p.z, n.x, n.y, n.z, luminance(*e));
+        let _ = write!(text, "\n{},{},{},{},{},{},{r},{g},{b},{}", p.x, p.y, p.z, n.x, n.y, n.z, luminance(*e));
     }
-    let verdict = if measured.achieved { "reached" } else { "NOT reached" };
-    let summary = format!(
-        "error asked {:.3} %: {verdict}; audit says {:.3} %, at most {:.3} % (95 %), bias {:+.3} ± {:.3} %",
-        100.0 * options.error,
-        100.0 * measured.audit.error,
-        100.0 * measured.audit.upper,
-        100.0 * measured.audit.bias,
-        196.0 * measured.audit.bias_error,
-    );
-    match &arguments.output {
+    let wrote = match &arguments.output {
         Some(path) => {
-            output::write(path, text.as_bytes())?;
-            if !global.json {
-                progress.say(&summary);
-                progress.say(&format!("wrote {} points to {}", points.len(), path.display()));
-            }
+            outputs.stage(path, (text + "\n").as_bytes())?;
+            outputs.commit()?;
+            Some(format!("wrote {} points to {}", points.len(), path.display()))
         }
-        None if !global.json => {
+        None => {
             progress.finish();
-            print!("{text}");
-            progress.say(&summary);
+            if !global.json {
+                print(&text)?;
+            }
+            None
         }
-        None => {}
-    }
+    };
+    let error = ErrorReport::new(&measured.audit, &arguments.solve, measured.achieved);
     if global.json {
-        let values: Option<Vec<[f32; 3]>> = arguments.output.is_none().then(|| measured.irradiance.clone());
+        let values: Option<&[radiosity::Bands]> = arguments.output.is_none().then_some(&measured.irradiance);
         let result = serde_json::json!({
-            "event": "result", "achieved": measured.achieved, "audit": measured.audit, "rounds": measured.rounds,
-            "stages": measured.stages.all(), "residual": measured.residual, "bound": measured.bound,
-            "seconds": progress.seconds(), "irradiance": values,
+            "event": "result", "error": error, "rounds": measured.rounds, "relative_residual": measured.residual,
+            "guaranteed_bound": measured.bound, "stages": progress.spent(), "seconds": progress.seconds(),
+            "output": arguments.output, "irradiance": values,
         });
-        println!("{result}");
+        return print(&result.to_string());
+    }
+    progress.say(&error.line());
+    if let Some(wrote) = wrote {
+        progress.say(&wrote);
     }
     Ok(())
 }

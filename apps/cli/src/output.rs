@@ -1,70 +1,212 @@
-//! Files that go out: checked before the work, written whole after it.
+//! What goes out: lines on standard output, and files that appear all together or not at all.
+//!
+//! Files are *promised* before the work, which finds out early what could not be written after hours; *staged* under
+//! a temporary name as soon as their bytes are there; and *committed*, that is renamed, when nothing can fail any
+//! more. A run that fails or is interrupted leaves no file and changes none that was there.
 
 use crate::Failure;
-use radiosity::io::image_out::{encode_exr, encode_png, save};
-use radiosity::{Camera, Picture, Scene, Tracer};
-use std::path::Path;
+use std::fs::{File, canonicalize, remove_file, rename};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Refuses, before hours of work, what could not be written after it.
-pub fn check(path: &Path, extensions: &[&str]) -> Result<(), Failure> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    if !extensions.contains(&extension.as_str()) {
-        let wanted = extensions.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
-        return Err(Failure::input(format!("{}: the name must end in {wanted}", path.display())));
+/// Exit code of an interrupted run: 128 and the number of SIGINT, as shells have it.
+const INTERRUPTED: i32 = 130;
+
+/// Temporary files of this process, for whoever ends it.
+static TEMPORARY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn temporary() -> MutexGuard<'static, Vec<PathBuf>> {
+    TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends the program at once and leaves no file of it behind.
+pub fn interrupt() -> ! {
+    // Held to the end: no file is begun or committed from now on.
+    let temporary = temporary();
+    for path in temporary.iter() {
+        // There is nobody left to tell.
+        let _ = remove_file(path);
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if let Err(error) = std::fs::create_dir_all(folder) {
-        return Err(Failure::input(format!("{}: the folder cannot be made: {error}", folder.display())));
+    std::process::exit(INTERRUPTED)
+}
+
+/// A line on standard output.
+pub fn print(line: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{line}").and_then(|()| out.flush()).map_err(|e| Failure::work(format!("standard output: {e}")))
+}
+
+/// A line on standard error.
+pub fn complain(line: &str) {
+    // Where not even this can be written, there is nobody to tell.
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// The files of one run.
+pub struct Outputs {
+    inputs: Vec<PathBuf>,
+    promised: Vec<PathBuf>,
+    staged: Vec<[PathBuf; 2]>,
+}
+
+impl Outputs {
+    /// None yet; `inputs` are files that no output may replace.
+    pub fn new(inputs: &[&Path]) -> Outputs {
+        let inputs = inputs.iter().filter_map(|path| canonicalize(path).ok()).collect();
+        Outputs { inputs, promised: Vec::new(), staged: Vec::new() }
     }
-    if path.is_dir() {
-        return Err(Failure::input(format!("{}: is a folder", path.display())));
-    }
-    Ok(())
-}
 
-/// Writes bytes whole or not at all.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    save(path, bytes).map_err(Failure::work)
-}
-
-/// Writes a picture as its name's ending says.
-pub fn write_picture(path: &Path, picture: &Picture, exposure: Option<f64>) -> Result<(), Failure> {
-    let exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let bytes = if exr {
-        encode_exr(picture.width, picture.height, &picture.pixels).map_err(Failure::work)?
-    } else {
-        png(picture, exposure)?
-    };
-    write(path, &bytes)
-}
-
-/// A tone-mapped picture as PNG bytes; exposed by itself where no exposure is given.
-pub fn png(picture: &Picture, exposure: Option<f64>) -> Result<Vec<u8>, Failure> {
-    let pixels = picture.tone_mapped(exposure.unwrap_or_else(|| picture.exposure()));
-    encode_png(picture.width, picture.height, &pixels).map_err(Failure::work)
-}
-
-/// The camera that was asked for by name or number, else the first, else one that is placed well.
-pub fn camera(scene: &Scene, tracer: &Tracer, wanted: Option<&str>) -> Result<Camera, Failure> {
-    let Some(wanted) = wanted else {
-        return Ok(scene.cameras.first().cloned().unwrap_or_else(|| radiosity::place_camera(tracer)));
-    };
-    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
-    let by_number = wanted.parse::<usize>().ok().and_then(|n| scene.cameras.get(n));
-    by_name.or(by_number).cloned().ok_or_else(|| {
-        let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} '{}'", c.name)).collect();
-        let there = if names.is_empty() { "it has none".to_owned() } else { format!("it has {}", names.join(", ")) };
-        Failure::input(format!("--camera {wanted}: the scene has no such camera; {there}"))
-    })
-}
-
-/// Width and height for a camera: as asked, else of 1280 pixels' width or height by its aspect.
-pub fn picture_size(camera: &Camera, asked: Option<(u32, u32)>) -> (u32, u32) {
-    asked.unwrap_or_else(|| match camera.aspect {
-        Some(aspect) if aspect.is_finite() && aspect > 0.0 => {
-            let height = (1280.0 * 720.0 / aspect).sqrt().clamp(16.0, 4096.0);
-            ((height * aspect).round().clamp(16.0, 8192.0) as u32, height.round() as u32)
+    /// Refuses, before hours of work, what could not be written after it.
+    pub fn promise(&mut self, path: &Path, extensions: &[&str]) -> Result<(), Failure> {
+        let refuse = |what: String| Err(Failure::input(format!("{}: {what}", path.display())));
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        if !extensions.contains(&extension.as_str()) {
+            let wanted = extensions.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
+            return refuse(format!("the name must end in {wanted}"));
         }
-        _ => (1280, 720),
-    })
+        if path.is_dir() {
+            return refuse("is a folder".to_owned());
+        }
+        let folder = folder(path);
+        let place = match canonicalize(folder) {
+            Ok(folder) if folder.is_dir() => folder.join(path.file_name().unwrap_or_default()),
+            Ok(_) => return refuse(format!("{} is no folder", folder.display())),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return refuse(format!("there is no folder {}; make it first", folder.display()));
+            }
+            Err(error) => return refuse(error.to_string()),
+        };
+        if self.inputs.contains(&canonicalize(path).unwrap_or(place.clone())) {
+            return refuse("is read by this run and would be replaced; choose another name".to_owned());
+        }
+        if self.promised.contains(&place) {
+            return refuse("two outputs have this name".to_owned());
+        }
+        // Permissions, a full disk, a read-only one: trying is the only way to know.
+        let probe = begin(path);
+        let tried = File::create(&probe);
+        end(&probe);
+        if let Err(error) = tried {
+            return refuse(format!("cannot be written: {error}"));
+        }
+        self.promised.push(place);
+        Ok(())
+    }
+
+    /// Writes bytes beside their place.
+    pub fn stage(&mut self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+        let beside = begin(path);
+        self.staged.push([beside.clone(), path.to_owned()]);
+        let written = File::create(&beside).and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        });
+        written.map_err(|error| unwritten(path, &error))
+    }
+
+    /// Puts all staged files in place.
+    pub fn commit(mut self) -> Result<(), Failure> {
+        // An interrupt waits until all are there.
+        let mut temporary = temporary();
+        if let Some([_, path]) = self.staged.iter().find(|[_, path]| path.is_dir()) {
+            return Err(Failure::work(format!("{}: has become a folder", path.display())));
+        }
+        while let Some([beside, path]) = self.staged.first() {
+            rename(beside, path).map_err(|error| unwritten(path, &error))?;
+            temporary.retain(|t| t != beside);
+            self.staged.remove(0);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Outputs {
+    fn drop(&mut self) {
+        self.staged.iter().for_each(|[beside, _]| end(beside));
+    }
+}
+
+fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::work(format!("{}: cannot be written: {error}", path.display()))
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A temporary name beside `path`, known to [`interrupt`] before the file exists.
+fn begin(path: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.tmp", std::process::id()));
+    let beside = path.with_file_name(name);
+    temporary().push(beside.clone());
+    beside
+}
+
+fn end(beside: &Path) {
+    // It may never have come to be.
+    let _ = remove_file(beside);
+    temporary().retain(|t| t != beside);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::{create_dir, read_dir, read_to_string, write};
+
+    /// A fresh folder; the name keeps tests and processes apart.
+    fn room(name: &str) -> PathBuf {
+        let room = std::env::temp_dir().join(format!("radiosity-output-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&room);
+        create_dir(&room).unwrap();
+        room
+    }
+
+    fn names(room: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            read_dir(room).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_appear_together_at_the_end() {
+        let room = room("together");
+        let (a, b) = (room.join("a.csv"), room.join("b.csv"));
+        write(&a, "old").unwrap();
+        let mut outputs = Outputs::new(&[]);
+        outputs.promise(&a, &["csv"]).unwrap();
+        outputs.promise(&b, &["csv"]).unwrap();
+        assert_eq!(names(&room), ["a.csv"], "a promise leaves nothing");
+        outputs.stage(&a, b"new").unwrap();
+        outputs.stage(&b, b"also").unwrap();
+        assert_eq!((read_to_string(&a).unwrap().as_str(), b.exists()), ("old", false));
+        outputs.commit().unwrap();
+        assert_eq!((read_to_string(&a).unwrap(), read_to_string(&b).unwrap()), ("new".to_owned(), "also".to_owned()));
+        assert_eq!(names(&room), ["a.csv", "b.csv"]);
+        std::fs::remove_dir_all(room).unwrap();
+    }
+
+    #[test]
+    fn what_is_not_committed_never_was() {
+        let room = room("never");
+        let (a, b) = (room.join("a.csv"), room.join("b.csv"));
+        write(&a, "old").unwrap();
+        let mut outputs = Outputs::new(&[]);
+        outputs.stage(&a, b"new").unwrap();
+        outputs.stage(&b, b"also").unwrap();
+        create_dir(&b).unwrap();
+        assert_eq!(outputs.commit().unwrap_err().code, 1);
+        assert_eq!(
+            (names(&room), read_to_string(&a).unwrap().as_str()),
+            (["a.csv", "b.csv"].map(str::to_owned).into(), "old")
+        );
+        let mut outputs = Outputs::new(&[]);
+        outputs.stage(&a, b"newer").unwrap();
+        drop(outputs);
+        assert_eq!((names(&room).len(), read_to_string(&a).unwrap().as_str()), (2, "old"));
+        std::fs::remove_dir_all(room).unwrap();
+    }
 }

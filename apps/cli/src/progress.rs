@@ -1,11 +1,12 @@
-//! Progress on a terminal or as JSON, with the time left; Ctrl-C.
+//! Progress on a terminal or as JSON, with the time left; the time of each part of the work; Ctrl-C.
 
-use crate::Global;
+use crate::{Global, output};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use radiosity::Monitor;
+use serde_json::json;
 use std::io::IsTerminal;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Events are printed at most this often.
@@ -17,10 +18,40 @@ pub struct Progress {
     json: bool,
     verbose: bool,
     quiet: bool,
-    stopped: Arc<AtomicBool>,
     start: Instant,
-    stage: Mutex<(String, Instant)>,
+    stage: Mutex<Stage>,
     last: AtomicU64,
+}
+
+/// What is being done, and the seconds that all parts of the work took so far. Every moment belongs to the part that
+/// began last, so that the parts make up the whole.
+struct Stage {
+    name: String,
+    since: Instant,
+    /// The library's stages count to the part that the program has named.
+    whole: bool,
+    spent: Vec<(String, f64)>,
+    part: usize,
+    part_since: Instant,
+}
+
+impl Stage {
+    fn close(&mut self) {
+        // What comes before the first part counts to it.
+        if let Some((_, seconds)) = self.spent.get_mut(self.part) {
+            let now = Instant::now();
+            *seconds += (now - self.part_since).as_secs_f64();
+            self.part_since = now;
+        }
+    }
+
+    fn open(&mut self, name: &str) {
+        self.close();
+        self.part = self.spent.iter().position(|(n, _)| n == name).unwrap_or_else(|| {
+            self.spent.push((name.to_owned(), 0.0));
+            self.spent.len() - 1
+        });
+    }
 }
 
 impl Progress {
@@ -33,26 +64,60 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("=> "));
         }
+        let start = Instant::now();
+        let spent = Vec::new();
+        let stage = Stage { name: String::new(), since: start, whole: false, spent, part: 0, part_since: start };
         Progress {
             bar,
             json: global.json,
             verbose: global.verbose,
             quiet: global.quiet,
-            stopped: Arc::new(AtomicBool::new(false)),
-            start: Instant::now(),
-            stage: Mutex::new((String::new(), Instant::now())),
+            start,
+            stage: Mutex::new(stage),
             last: AtomicU64::new(0),
         }
     }
 
-    /// The first Ctrl-C ends the run cleanly, the second at once.
+    /// Ctrl-C ends the program at once: files are put in place all together at the end, so there is nothing to save.
     pub fn listen_for_interrupts(&self) -> Result<(), ctrlc::Error> {
-        let stopped = self.stopped.clone();
+        let (bar, json) = (self.bar.clone(), self.json);
         ctrlc::set_handler(move || {
-            if stopped.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
+            bar.finish_and_clear();
+            // Written in a thread of its own, since a full pipe that nobody reads must not keep the program alive.
+            let told = std::thread::spawn(move || {
+                if json {
+                    let event = json!({ "event": "error", "exit_code": 130, "message": "interrupted" });
+                    let _ = output::print(&event.to_string());
+                }
+                output::complain("interrupted");
+            });
+            let patience = Instant::now();
+            while !told.is_finished() && patience.elapsed().as_millis() < 100 {
+                std::thread::sleep(std::time::Duration::from_millis(1));
             }
+            output::interrupt()
         })
+    }
+
+    /// Begins a part of the work; the library's own stages count to it.
+    pub fn part(&self, name: &str) {
+        let mut stage = self.lock();
+        stage.open(name);
+        stage.whole = true;
+        drop(stage);
+        self.show(name);
+    }
+
+    /// From now on the library's stages are parts of their own.
+    pub fn parts(&self) {
+        self.lock().whole = false;
+    }
+
+    /// Seconds by part, in the order of first use.
+    pub fn spent(&self) -> Vec<(String, f64)> {
+        let mut stage = self.lock();
+        stage.close();
+        stage.spent.clone()
     }
 
     /// Seconds since the program began.
@@ -68,22 +133,42 @@ impl Progress {
     /// A line for the user: on standard error, above the bar.
     pub fn say(&self, text: &str) {
         if self.json {
-            println!("{}", serde_json::json!({ "event": "note", "message": text, "seconds": self.seconds() }));
+            self.tell(&json!({ "event": "note", "message": text, "seconds": self.seconds() }));
         } else if !self.quiet {
-            self.bar.suspend(|| eprintln!("{text}"));
+            self.bar.suspend(|| output::complain(text));
         }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Stage> {
+        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn show(&self, name: &str) {
+        let mut stage = self.lock();
+        (stage.name, stage.since) = (name.to_owned(), Instant::now());
+        drop(stage);
+        self.bar.reset();
+        self.bar.set_prefix(name.to_owned());
+        self.last.store(0, Ordering::Relaxed);
+        if self.json {
+            self.tell(&json!({ "event": "stage", "stage": name, "seconds": self.seconds() }));
+        }
+    }
+
+    fn tell(&self, event: &serde_json::Value) {
+        // A listener that has gone does not stop the work: its files are still wanted.
+        let _ = output::print(&event.to_string());
     }
 }
 
 impl Monitor for Progress {
     fn stage(&self, name: &str) {
-        *self.stage.lock().unwrap_or_else(|e| e.into_inner()) = (name.to_owned(), Instant::now());
-        self.bar.reset();
-        self.bar.set_prefix(name.to_owned());
-        self.last.store(0, Ordering::Relaxed);
-        if self.json {
-            println!("{}", serde_json::json!({ "event": "stage", "stage": name, "seconds": self.seconds() }));
+        let mut stage = self.lock();
+        if !stage.whole {
+            stage.open(name);
         }
+        drop(stage);
+        self.show(name);
     }
 
     fn step(&self, done: usize, total: usize) -> bool {
@@ -94,21 +179,46 @@ impl Monitor for Progress {
             self.bar.set_length(total as u64);
             self.bar.set_position(done as u64);
             if self.json {
-                let (stage, since) = self.stage.lock().unwrap_or_else(|e| e.into_inner()).clone();
+                let stage = self.lock();
+                let (name, since) = (stage.name.clone(), stage.since);
+                drop(stage);
                 let left = since.elapsed().as_secs_f64() * (total - done.min(total)) as f64 / done.max(1) as f64;
-                let event = serde_json::json!({
-                    "event": "progress", "stage": stage, "done": done, "total": total,
+                self.tell(&json!({
+                    "event": "progress", "stage": name, "done": done, "total": total,
                     "seconds": self.seconds(), "seconds_left_in_stage": left,
-                });
-                println!("{event}");
+                }));
             }
         }
-        !self.stopped.load(Ordering::SeqCst)
+        true
     }
 
     fn note(&self, text: &str) {
         if self.verbose || self.json {
             self.say(text);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_make_up_the_whole() {
+        let progress = Progress::new(&Global { threads: None, json: false, quiet: true, verbose: false });
+        progress.part("reading");
+        progress.stage("hidden");
+        progress.parts();
+        progress.stage("rays");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        progress.part("picture");
+        progress.parts();
+        progress.stage("rays");
+        let before = progress.seconds();
+        let spent = progress.spent();
+        let names: Vec<&str> = spent.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["reading", "rays", "picture"]);
+        let sum: f64 = spent.iter().map(|(_, seconds)| seconds).sum();
+        assert!(spent[1].1 >= 0.005 && sum <= progress.seconds() && sum >= before - 1e-9, "{spent:?} {before}");
     }
 }

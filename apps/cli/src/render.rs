@@ -1,8 +1,10 @@
 //! `radiosity render`: a picture from the solution.
 
 use crate::input::{self, PictureArguments, SceneArguments, SolveArguments};
+use crate::output::{Outputs, print};
 use crate::progress::Progress;
-use crate::{Failure, Global, output};
+use crate::report::ErrorReport;
+use crate::{Failure, Global, views};
 use clap::Args;
 use radiosity::{Mesh, RenderOptions, Tracer};
 use std::path::PathBuf;
@@ -23,30 +25,33 @@ pub struct Arguments {
 
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
-    output::check(&arguments.output, &["png", "exr"])?;
+    let mut outputs = Outputs::new(&arguments.scene.files());
+    outputs.promise(&arguments.output, &["png", "exr"])?;
+    progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
     let mesh = Mesh::new(&input.scene);
     let tracer = Tracer::new(&input.scene, &mesh);
-    let camera = output::camera(&input.scene, &tracer, arguments.picture.camera.as_deref())?;
+    let camera = views::camera(&input.scene, &tracer, arguments.picture.camera.as_deref())?;
+    progress.parts();
     let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
-    let (width, height) = output::picture_size(&camera, arguments.picture.size);
+    progress.part("picture");
+    let (width, height) = views::picture_size(&camera, arguments.picture.size);
     let render = RenderOptions { width, height, ..RenderOptions::default() };
     let picture = radiosity::render(&baked.solution, &baked.field, &camera, &render, progress)?;
-    output::write_picture(&arguments.output, &picture, arguments.picture.exposure)?;
+    let exposure = arguments.picture.exposure.unwrap_or_else(|| picture.exposure());
+    outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
+    outputs.commit()?;
+
+    let error = ErrorReport::new(&baked.audit, &arguments.solve, baked.achieved);
     if global.json {
         let result = serde_json::json!({
-            "event": "result", "achieved": baked.achieved, "audit": baked.audit, "width": width, "height": height,
-            "exposure": arguments.picture.exposure.unwrap_or_else(|| picture.exposure()), "seconds": progress.seconds(),
+            "event": "result", "error": error, "output": arguments.output, "width": width, "height": height,
+            "exposure": exposure, "stages": progress.spent(), "seconds": progress.seconds(),
         });
-        println!("{result}");
-    } else {
-        progress.say(&format!(
-            "wrote {} ({width} x {height}); error of the light {:.3} %, at most {:.3} % (95 %); {:.1} s",
-            arguments.output.display(),
-            100.0 * baked.audit.error,
-            100.0 * baked.audit.upper,
-            progress.seconds(),
-        ));
+        return print(&result.to_string());
     }
+    progress.say(&error.line());
+    let output = arguments.output.display();
+    progress.say(&format!("wrote {output} ({width} x {height}), {:.1} s", progress.seconds()));
     Ok(())
 }

@@ -1,18 +1,59 @@
 //! The account of a run, as data; [`crate::html`] makes a page of it.
 
-use radiosity::Balance;
+use crate::illuminance::Illuminance;
+use crate::progress::Progress;
+use crate::views::View;
+use crate::{figures, input};
 use radiosity::measure::Round;
-use radiosity::{Audit, Faults};
+use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Mesh};
 use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::SystemTime;
 
 /// What was asked, what came out, and how far to trust it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Name and version of the program.
+    /// Name of the program.
     pub program: String,
-    /// File of the scene, or the name of the built-in one.
-    pub scene: String,
-    /// Triangles, materials, lights.
+    /// Its version.
+    pub version: String,
+    /// The command line as it was given.
+    pub command: Vec<String>,
+    /// When the report was written, UTC.
+    pub written: String,
+    /// The scene.
+    pub scene: SceneReport,
+    /// What was asked and what the audit found.
+    pub error: ErrorReport,
+    /// Illuminance, lx.
+    pub illuminance: Illuminance,
+    /// Rounds of refinement.
+    pub rounds: Vec<Round>,
+    /// Where the light goes, lm per band.
+    pub balance: Balance,
+    /// How the equation was solved.
+    pub solution: SolutionReport,
+    /// Time.
+    pub time: TimeReport,
+    /// Peak memory of the process, MB; none where the system does not tell.
+    pub peak_memory_mb: Option<f64>,
+    /// The lightmap, if there is one.
+    pub lightmap: Option<LightmapReport>,
+    /// Faults of the input.
+    pub faults: Faults,
+    /// Files that were written.
+    pub outputs: Vec<String>,
+    /// What the figures mean.
+    pub about: BTreeMap<&'static str, &'static str>,
+}
+
+/// What is said of a scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneReport {
+    /// Its file, or the name of the built-in one.
+    pub name: String,
+    /// Triangles.
     pub triangles: usize,
     /// Materials.
     pub materials: usize,
@@ -20,44 +61,106 @@ pub struct Report {
     pub lights: Vec<String>,
     /// Area of all surfaces, m².
     pub area: f64,
+}
+
+/// What is said of an error.
+#[derive(Clone, Debug, Serialize)]
+pub struct ErrorReport {
     /// Relative error that was asked for.
-    pub asked_error: f64,
+    pub asked: f64,
     /// Whether the audit's upper bound meets it.
     pub achieved: bool,
-    /// The audit.
-    pub audit: Audit,
-    /// Rounds of refinement.
-    pub rounds: Vec<Round>,
+    /// The audit's estimate.
+    pub estimated: f64,
+    /// One-sided 95 % bound from above; infinite (in JSON: null) where there is none.
+    pub upper_95_one_sided: f64,
+    /// One-sided 95 % bound from below.
+    pub lower_95_one_sided: f64,
+    /// Mean difference over mean illuminance.
+    pub bias: f64,
+    /// Its standard error.
+    pub bias_standard_error: f64,
+    /// Points that the audit looked at.
+    pub points: usize,
+    /// Paths per estimate, two estimates per point.
+    pub paths_per_estimate: u32,
+    /// Mean illuminance at the points by the referee, lx.
+    pub mean_illuminance: f64,
+    /// Seed of the audit.
+    pub seed: u64,
+}
+
+impl ErrorReport {
+    /// Of an audit and what was asked of it.
+    pub fn new(audit: &Audit, solve: &input::SolveArguments, achieved: bool) -> ErrorReport {
+        ErrorReport {
+            asked: solve.error,
+            achieved,
+            estimated: audit.error,
+            upper_95_one_sided: audit.upper,
+            lower_95_one_sided: audit.lower,
+            bias: audit.bias,
+            bias_standard_error: audit.bias_error,
+            points: audit.points,
+            paths_per_estimate: audit.paths,
+            mean_illuminance: audit.mean_illuminance,
+            seed: solve.seed,
+        }
+    }
+
+    /// In a line.
+    pub fn line(&self) -> String {
+        let percent = |x: f64| format!("{:.3} %", 100.0 * x);
+        let verdict = if self.achieved { "reached" } else { "NOT reached" };
+        let bound = match self.upper_95_one_sided {
+            upper if upper.is_finite() => format!("at most {} with 95 % confidence", percent(upper)),
+            _ => "without a bound, since the audit had too few points".to_owned(),
+        };
+        format!("error asked {}: {verdict}; audit says {}, {bound}", percent(self.asked), percent(self.estimated))
+    }
+}
+
+/// What is said of a solution.
+#[derive(Clone, Debug, Serialize)]
+pub struct SolutionReport {
     /// Elements.
     pub elements: usize,
     /// Width of an element, metres.
     pub element_size: f64,
-    /// Elements that lie inside solids, wholly and in part.
-    pub buried: [usize; 2],
+    /// Elements that lie inside solids.
+    pub buried: usize,
+    /// Elements that lie inside solids in part.
+    pub partly_buried: usize,
     /// Rays per element.
     pub rays_per_element: usize,
     /// Largest difference of a row sum from one, before any repair.
     pub raw_closure: f64,
-    /// Solver: applications of the transport, relative residual, guaranteed bound (lm/m²) by band.
-    pub solver: radiosity::solve::Info,
-    /// Where the light goes.
-    pub balance: Balance,
-    /// Least, mean and largest illuminance of the elements, lux.
-    pub illuminance: [f32; 3],
-    /// Seconds by stage.
-    pub stages: Vec<(String, f64)>,
+    /// Applications of the transport in the last solve.
+    pub steps: usize,
+    /// Relative residual by band.
+    pub relative_residual: Vec<f64>,
+    /// Guaranteed bound of the discrete equation's error by band, lm/m².
+    pub guaranteed_bound: Vec<f64>,
+}
+
+/// What is said of time.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimeReport {
     /// Seconds in all.
     pub seconds: f64,
     /// Threads.
     pub threads: usize,
-    /// Peak memory of the process, MB; zero where the system does not tell.
-    pub peak_memory_mb: f64,
-    /// Files that were written.
-    pub outputs: Vec<String>,
-    /// Lightmap: texels per metre, texels, seam difference before and after fitting (lx), if there is one.
-    pub lightmap: Option<LightmapReport>,
-    /// Faults of the input.
-    pub faults: Faults,
+    /// Seconds by stage, in the order of first use.
+    pub stages: Vec<StageReport>,
+}
+
+/// The time of a stage.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageReport {
+    /// Its name.
+    pub name: String,
+    /// Seconds.
+    pub seconds: f64,
 }
 
 /// What is said of a lightmap.
@@ -75,9 +178,128 @@ pub struct LightmapReport {
     pub seams_after: f64,
 }
 
+impl LightmapReport {
+    /// Of a lightmap.
+    pub fn new(map: &Lightmap) -> LightmapReport {
+        LightmapReport {
+            density: map.density,
+            texels: map.texels,
+            pages: map.pages.clone(),
+            seams_before: map.seams[0],
+            seams_after: map.seams[1],
+        }
+    }
+}
+
+impl Report {
+    /// Of a bake that is done but for the writing of this report.
+    pub fn new(
+        input: &input::Input,
+        mesh: &Mesh,
+        solve: &input::SolveArguments,
+        (baked, view): (&Baked, Option<&View>),
+        lightmap: Option<LightmapReport>,
+        outputs: &[&Path],
+        progress: &Progress,
+    ) -> Report {
+        let solution = &baked.solution;
+        let lights = solution.luminaires.lights.iter().enumerate();
+        let light = |(i, name): (usize, &str)| match name {
+            "" => format!("light {i}"),
+            name => name.to_owned(),
+        };
+        let (illuminance, balance, raw_closure) = (
+            Illuminance::new(solution, view.map(|v| v.illuminance.as_slice())),
+            solution.balance(),
+            solution.raw_closure(),
+        );
+        let stages: Vec<StageReport> =
+            progress.spent().into_iter().map(|(name, seconds)| StageReport { name, seconds }).collect();
+        Report {
+            program: "radiosity".to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: command(),
+            written: utc(SystemTime::now()),
+            scene: SceneReport {
+                name: input.title.clone(),
+                triangles: input.scene.triangles.len(),
+                materials: input.scene.materials.len(),
+                lights: lights.map(|(i, l)| light((i, l.name()))).collect(),
+                area: (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum(),
+            },
+            error: ErrorReport::new(&baked.audit, solve, baked.achieved),
+            illuminance,
+            rounds: baked.rounds.clone(),
+            balance,
+            solution: SolutionReport {
+                elements: solution.elements.len(),
+                element_size: solution.element_size,
+                buried: solution.exposure.buried,
+                partly_buried: solution.exposure.partial,
+                rays_per_element: solution.rays(),
+                raw_closure,
+                steps: solution.info.steps,
+                relative_residual: solution.info.residual.clone(),
+                guaranteed_bound: solution.info.bound.clone(),
+            },
+            time: TimeReport {
+                seconds: stages.iter().map(|stage| stage.seconds).sum(),
+                threads: rayon::current_num_threads(),
+                stages,
+            },
+            peak_memory_mb: peak_memory_mb(),
+            lightmap,
+            faults: input.faults.clone(),
+            outputs: outputs.iter().map(|path| path.display().to_string()).collect(),
+            about: figures::ABOUT.iter().copied().collect(),
+        }
+    }
+}
+
+/// The command line as given; the program by its name, wherever it is installed.
+fn command() -> Vec<String> {
+    let arguments = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
+    std::iter::once("radiosity".to_owned()).chain(arguments).collect()
+}
+
 /// Peak memory of this process in MB, where the system tells (Linux).
-pub fn peak_memory_mb() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<f64>().ok()).map_or(0.0, |kb| kb / 1024.0)
+fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    Some(line.trim().trim_end_matches("kB").trim().parse::<f64>().ok()? / 1024.0)
+}
+
+/// A moment to the minute, in the calendar of the civil day (Hinnant, "chrono-compatible low-level date algorithms").
+fn utc(moment: SystemTime) -> String {
+    let seconds = moment.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, minutes) = (seconds / 86_400, seconds / 60 % 1440);
+    // Years begin in March here, so that the leap day is the last; eras are of 400 years.
+    let shifted = days + 719_468;
+    let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let year = 400 * era + year_of_era + u64::from(month <= 2);
+    format!("{year}-{month:02}-{day:02} {:02}:{:02} UTC", minutes / 60, minutes % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for (seconds, date) in [
+            (0, "1970-01-01 00:00 UTC"),
+            (951_782_399, "2000-02-28 23:59 UTC"),
+            (951_782_400, "2000-02-29 00:00 UTC"),
+            (1_709_251_199, "2024-02-29 23:59 UTC"),
+            (4_107_542_400, "2100-03-01 00:00 UTC"),
+        ] {
+            assert_eq!(utc(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)), date);
+        }
+    }
 }

@@ -126,9 +126,11 @@ fn damaged_points_and_skies() {
     }
 }
 
-/// The decoder asserted on its compressed blocks instead of reporting them.
+/// The decoder asserted on its compressed blocks instead of reporting them. Where it is built without overflow checks it
+/// decodes them to infinities, which are refused as well.
 #[test]
 fn a_sky_with_damaged_blocks_is_refused() {
     let text = parse_sky("sky.exr", &data("sky-damaged-b44.exr")).unwrap_err().to_string();
-    assert!(text.contains("sky.exr: cannot be decoded"), "{text}");
+    let what = if cfg!(debug_assertions) { "sky.exr: cannot be decoded" } else { "sky.exr: 16 pixels are not finite" };
+    assert!(text.contains(what), "{text}");
 }

@@ -112,16 +112,9 @@ impl Solution<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
         let receivers = PointReceivers { places };
-        let mut sum = vec![[0f32; 3]; places.len()];
-        self.stages.time(monitor, "direct light", || -> Result<(), Error> {
-            for light in 0..self.luminaires.lights.len() {
-                let column = self.luminaires.column(light, self.tracer(), &receivers, shadowing, &Watch(monitor))?;
-                for (sum, (e, _)) in sum.iter_mut().zip(&column) {
-                    (0..3).for_each(|band| sum[band] += e[band]);
-                }
-            }
-            Ok(())
+        let columns = self.stages.time(monitor, "direct light", || {
+            self.luminaires.columns(self.tracer(), &receivers, shadowing, &Watch(monitor))
         })?;
-        Ok(sum)
+        Ok((0..places.len()).map(|i| columns.mean(i)).collect())
     }
 }

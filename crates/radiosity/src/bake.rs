@@ -67,7 +67,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let stages = Stages::default();
     let mut solve = options.solve;
     solve.rays = solve.rays.max(rays_for(options.error, 256.0, 32, 2048));
-    let mut shadowing = Shadowing { pilot: 16, mixed: rays_for(options.error, 128.0, 32, 4096) as u32 };
+    let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
     let mut solution = Solution::new(tracer, &solve, monitor)?;
     let most_paths = rays_for(options.error, 4096.0, 64, 1 << 16) as u32;
     let watched: Vec<Station> = stations::spread(&solution, options.audit_points, options.seed as u32);
@@ -81,7 +81,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             elements: solution.elements.len(),
             rays: solution.rays(),
             gather: 0,
-            shadow_rays: shadowing.mixed,
+            shadow_rays: shadowing.rays,
             error: audit.error,
             upper: audit.upper,
             seconds: start.elapsed().as_secs_f64(),
@@ -101,7 +101,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             stages.absorb(&solution.stages);
             return Ok(Baked { solution, field, shadowing, audit, achieved, rounds, stages });
         }
-        shadowing.mixed *= 2;
+        shadowing.rays *= 2;
         if noisy {
             solution.refine(next.rays, monitor)?;
         } else {

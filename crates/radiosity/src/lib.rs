@@ -16,6 +16,7 @@
 pub mod answer;
 pub mod bake;
 mod cornell;
+mod division;
 mod error;
 pub mod measure;
 mod monitor;

@@ -34,6 +34,9 @@ impl Default for MeasureOptions {
     }
 }
 
+/// Cells to aim for where they are looked up by a gather at each point.
+const LOOKED_UP_CELLS: usize = 20_000;
+
 /// Fewest pairs of estimates that an audit judges by.
 const LEAST_WATCHED: usize = 64;
 
@@ -95,9 +98,12 @@ pub fn measure(
     let stages = Stages::default();
     let places: Vec<Place> = points.iter().map(|(p, n)| stations::snap(tracer, *p, *n)).collect();
     let mut solve = options.solve;
-    solve.rays = solve.rays.max(rays_for(options.error, 64.0, 16, 1024));
-    let mut gather = rays_for(options.error, 256.0, 32, 8192);
-    let mut shadowing = Shadowing { pilot: 32, mixed: rays_for(options.error, 256.0, 64, 8192) as u32 };
+    // The elements are only looked up, and the noise of many averages out: few rays each, and small ones.
+    solve.rays = solve.rays.max(rays_for(options.error, 32.0, 16, 1024));
+    solve.cells = solve.cells.max(LOOKED_UP_CELLS);
+    solve.variation = solve.variation.min(2.0 * options.error);
+    let mut gather = rays_for(options.error, 2048.0, 32, 16384);
+    let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 1024.0, 64, 8192) as u32 };
     let mut solution = Solution::new(tracer, &solve, monitor)?;
 
     // The referee looks at every n-th point.
@@ -118,7 +124,7 @@ pub fn measure(
             elements: solution.elements.len(),
             rays: solution.rays(),
             gather,
-            shadow_rays: shadowing.mixed,
+            shadow_rays: shadowing.rays,
             error: audit.error,
             upper: audit.upper,
             seconds: start.elapsed().as_secs_f64(),
@@ -137,7 +143,7 @@ pub fn measure(
             });
         }
         gather *= 2;
-        shadowing.mixed *= 2;
+        shadowing.rays *= 2;
         let rays = 2 * solution.rays();
         let smaller = solution.element_size / std::f64::consts::SQRT_2;
         if rounds.len() % 2 == 0 && options.solve.element_size.is_none() {

@@ -23,7 +23,7 @@ pub struct RenderOptions {
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        RenderOptions { width: 1280, height: 720, shadowing: Shadowing { pilot: 16, mixed: 64 } }
+        RenderOptions { width: 1280, height: 720, shadowing: Shadowing { places: 1, rays: 64 } }
     }
 }
 

@@ -4,27 +4,29 @@
 //! X = (E − P) + R (D + S + F X), with D the direct irradiance and S the sky's, both known before the solve.
 
 use crate::Error;
+use crate::division::{Optics, divided};
 use crate::monitor::{Monitor, Stages, Watch};
 use radiosity_scene::{Bands, Elements, SkyPatches};
 use radiosity_solve::{DiffuseResponse, Go, Info, Params, jacobi};
 use radiosity_trace::Tracer;
-use radiosity_transport::{ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires, Shadowing};
+use radiosity_transport::{Columns, ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires, Shadowing};
 use rayon::prelude::*;
 use serde::Serialize;
-
-/// Elements that the program aims for on top of one per triangle, when it chooses their size itself. At ten thousand
-/// the walls of a room are cut into cells of some 15 cm; their light varies by a few percent from cell to cell.
-const AUTOMATIC_ELEMENTS: f64 = 10_000.0;
 
 /// How to solve.
 #[derive(Clone, Copy, Debug)]
 pub struct SolveOptions {
-    /// Width of an element, metres; chosen from the scene if `None`.
+    /// Width of a cell, metres: of an element, where direct light is even. `None` chooses it by `cells`.
     pub element_size: Option<f64>,
-    /// M: rays per element.
+    /// How many cells to aim for on top of one per triangle. At ten thousand the walls of a room are cut into cells of
+    /// some 15 cm, and their light varies by a few percent from cell to cell.
+    pub cells: usize,
+    /// How much direct light may vary within elements: the flux that leaves them by their standard deviation, relative
+    /// to that of their direct light.
+    pub variation: f64,
+    /// M: rays per cell.
     pub rays: usize,
-    /// Shadow rays per element and light. Their noise averages out over the elements that a receiver sees, a bias
-    /// would not: so no pilot decides here, as its stopping rule would take half of every faint penumbra away.
+    /// Shadow rays per cell. Their noise averages out over the elements that a receiver sees.
     pub shadowing: Shadowing,
     /// When the solver stops.
     pub solver: Params,
@@ -36,8 +38,10 @@ impl Default for SolveOptions {
     fn default() -> Self {
         SolveOptions {
             element_size: None,
+            cells: 10_000,
+            variation: 0.02,
             rays: 64,
-            shadowing: Shadowing { pilot: 8, mixed: 8 },
+            shadowing: Shadowing { places: 8, rays: 8 },
             solver: Params { tolerance: 1e-5, max_steps: 500 },
             memory: 4 << 30,
         }
@@ -72,8 +76,8 @@ pub struct Solution<'a> {
     pub exposure: Exposure,
     /// The lights that are evaluated directly.
     pub luminaires: Luminaires,
-    /// Direct irradiance by light and element, lux per band.
-    pub columns: Vec<Vec<Bands>>,
+    /// Direct irradiance by element and light, lux per band.
+    pub columns: Columns,
     /// Area of each element, m².
     pub area: Vec<f64>,
     /// Reflectance of each element.
@@ -84,7 +88,7 @@ pub struct Solution<'a> {
     pub info: Info,
     /// Time by stage.
     pub stages: Stages,
-    /// Width of an element, metres.
+    /// Width of a cell, metres.
     pub element_size: f64,
     sky: SkyPatches,
     table: HitTable,
@@ -118,24 +122,17 @@ impl<'a> Solution<'a> {
             });
         }
         let watch = Watch(monitor);
-        let elements = stages.time(monitor, "elements", || Elements::new(scene, mesh, element_size));
-        let ids = 0..elements.len() as u32;
-        let area: Vec<f64> = ids.clone().into_par_iter().map(|e| elements.area(mesh, e)).collect();
-        let (reflectance, exitance): (Vec<Bands>, Vec<Bands>) =
-            ids.into_par_iter().map(|e| elements.optics(scene, mesh, e)).unzip();
+        let elements = stages.time(monitor, "elements", || {
+            divided(tracer, Elements::new(scene, mesh, element_size), options.variation, &watch)
+        })?;
+        let Optics { area, reflectance, exitance } = Optics::new(tracer, &elements);
         let exposure = stages.time(monitor, "exposure", || Exposure::new(tracer, mesh, &elements, &watch))?;
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
         let sky = SkyPatches::new(&scene.sky, scene.up.direction());
 
         let receivers = ElementReceivers { mesh, elements: &elements, exposure: &exposure };
-        let columns = stages.time(monitor, "direct light", || {
-            (0..luminaires.lights.len())
-                .map(|light| {
-                    let column = luminaires.column(light, tracer, &receivers, &options.shadowing, &watch)?;
-                    Ok(column.into_iter().map(|(e, _)| e).collect())
-                })
-                .collect::<Result<Vec<Vec<Bands>>, radiosity_transport::Stopped>>()
-        })?;
+        let columns = stages
+            .time(monitor, "direct light", || luminaires.columns(tracer, &receivers, &options.shadowing, &watch))?;
 
         let id_space = IdSpace { elements: &elements, sky };
         let table = HitTable::new(area.clone(), &id_space);
@@ -223,9 +220,10 @@ impl<'a> Solution<'a> {
         let direct = self.direct();
         let mut e = vec![0.0; 3 * n];
         for i in 0..n {
+            let seen = self.columns.seen(i);
             for band in 0..3 {
                 let own = f64::from(self.exitance[i][band] - self.luminaires.promoted[i][band]);
-                let arriving = f64::from(direct[i][band]) + f64::from(known[i][band]);
+                let arriving = f64::from(seen[band]) + f64::from(known[i][band]);
                 e[3 * i + band] = own + f64::from(self.reflectance[i][band]) * arriving;
             }
         }
@@ -262,13 +260,7 @@ impl<'a> Solution<'a> {
 
     /// Direct irradiance of all lights together, by element.
     pub fn direct(&self) -> Vec<Bands> {
-        let mut sum = vec![[0f32; 3]; self.elements.len()];
-        for column in &self.columns {
-            for (sum, e) in sum.iter_mut().zip(column) {
-                (0..3).for_each(|band| sum[band] += e[band]);
-            }
-        }
-        sum
+        (0..self.elements.len()).map(|i| self.columns.mean(i)).collect()
     }
 
     /// Irradiance of each element, lux per band.
@@ -335,25 +327,21 @@ impl<'a> Solution<'a> {
         let n = self.elements.len();
         let (first_sky, nothing) = (n as u32, (self.values.len() - 1) as u32);
         let radiosity = self.radiosity();
-        let m = self.table.columns() as f64;
         let mut sums = [[0f64; 3]; 6];
         let weight = self.exposed_area();
-        let point_lights = self
-            .luminaires
-            .lights
-            .iter()
-            .zip(&self.columns)
-            .filter(|(light, _)| matches!(light, radiosity_transport::Light::Point(_)));
-        for (_, column) in point_lights {
-            for (e, w) in column.iter().zip(&weight) {
-                (0..3).for_each(|band| sums[1][band] += w * f64::from(e[band]));
+        for (i, w) in weight.iter().enumerate() {
+            for (light, e) in self.luminaires.lights.iter().zip(self.columns.seen_by_light(i)) {
+                if matches!(light, radiosity_transport::Light::Point(_)) {
+                    (0..3).for_each(|band| sums[1][band] += w * f64::from(e[band]));
+                }
             }
         }
         let shares: Vec<[f64; 2]> = (0..n)
             .into_par_iter()
             .map(|i| {
-                let (mut sky, mut back) = (0u32, 0u32);
+                let (mut sky, mut back, mut m) = (0u32, 0u32, 0.0);
                 for id in self.table.row_ids(i) {
+                    m += 1.0;
                     back += u32::from(id == nothing);
                     sky += u32::from(id >= first_sky && id != nothing);
                 }
@@ -385,11 +373,11 @@ impl<'a> Solution<'a> {
     }
 }
 
-/// Width of an element: as asked, or such that the scene's area makes [`AUTOMATIC_ELEMENTS`].
+/// Width of a cell: as asked, or such that the scene's area makes as many as asked.
 fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
     let mesh = tracer.mesh;
     options.element_size.unwrap_or_else(|| {
         let total: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
-        (2.0 * total / AUTOMATIC_ELEMENTS).sqrt()
+        (2.0 * total / options.cells.max(1) as f64).sqrt()
     })
 }

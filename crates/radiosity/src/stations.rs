@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use radiosity_scene::Side;
 use radiosity_trace::sampling::{Sequence, hash, unit};
 use radiosity_trace::{Found, Place, Tracer};
+use radiosity_transport::exposure::open_place;
 use radiosity_view::picture::shading_normal;
 
 /// `count` stations spread evenly over the exposed area, one in each of as many equal shares of it. They receive with
@@ -23,7 +24,11 @@ pub fn spread(solution: &Solution, count: usize, seed: u32) -> Vec<Station> {
             element += 1;
         }
         let [x, y, _, _] = Sequence::new(seed ^ hash(i as u32), 0x0a0d).point(0);
-        let Some((x, y)) = solution.exposure.place(element as u32, x, y) else { continue };
+        let mask = solution.exposure.mask(element as u32);
+        if mask == 0 {
+            continue;
+        }
+        let (x, y) = open_place(mask, x, y);
         let (triangle, side) = solution.elements.place(element as u32);
         let uv = solution.elements.sample(element as u32, x, y);
         stations.push(station(solution.tracer(), triangle, uv, side));

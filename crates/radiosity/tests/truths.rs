@@ -139,7 +139,7 @@ fn catalogue_6_sphere_cavity() {
         let exact = lamp / (4.0 * PI - 0.5 * (dark + lamp));
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let shadowing = Shadowing { pilot: 64, mixed: 64 };
+        let shadowing = Shadowing { places: 1, rays: 64 };
         let options = SolveOptions { rays: 256, element_size: Some(0.3), shadowing, ..SolveOptions::default() };
         let solution = Solution::new(&tracer, &options, &()).unwrap();
         let (mut squares, mut weight) = (0.0, 0.0);

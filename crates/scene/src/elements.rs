@@ -1,17 +1,19 @@
 //! Elements: the pieces of surface whose radiosity is one number per band.
 //!
-//! They are implicit. A triangle of the [`Mesh`] is divided into k × k congruent cells, k a power of two, and the id
-//! of a point's element is `base[triangle] + cell`: rays see the input triangles only, and a hit costs three
-//! multiplications to name its element. Double-sided triangles own a second run of elements for their back.
+//! They are implicit. A triangle of the [`Mesh`] is divided into k × k congruent cells, and a cell into d × d elements,
+//! both powers of two; rays see the input triangles only, and a hit costs a few multiplications and two loads to name
+//! its element. Cells have the size that smooth light needs; d is 1 but where direct light changes within a cell
+//! ([`Elements::refined`]). Double-sided triangles own a second run of cells for their back.
 
 use crate::{Bands, Mesh, Scene, Side};
 use glam::{DVec2, DVec3};
+use std::ops::Range;
 
 /// Index into the elements.
 pub type ElementId = u32;
 
-/// Not an element: the back of a one-sided triangle.
-pub const NO_ELEMENT: ElementId = u32::MAX;
+/// No cell: the back of a one-sided triangle.
+const NO_CELL: u32 = u32::MAX;
 
 /// Cells along an edge never exceed this: 64² cells keep ids within a triangle in 12 bits and stop a single huge
 /// triangle from taking the whole budget; larger surfaces are rare and smooth.
@@ -22,30 +24,51 @@ const MAX_DIVISION: u32 = 64;
 pub struct Elements {
     /// Cells along an edge of each triangle.
     division: Vec<u32>,
-    /// First element of the front and of the back of each triangle; [`NO_ELEMENT`] where there is none.
-    base: Vec<[ElementId; 2]>,
-    /// Triangle of each element.
+    /// First cell of the front and of the back of each triangle; [`NO_CELL`] where there is none.
+    base: Vec<[u32; 2]>,
+    /// Triangle of each cell.
     triangle: Vec<u32>,
+    /// First element of each cell, and at the end the number of elements.
+    first: Vec<ElementId>,
+    /// Cell of each element.
+    cell: Vec<u32>,
 }
 
 impl Elements {
-    /// Divides every triangle into cells about `size` metres wide.
+    /// Divides every triangle into cells about `size` metres wide, of one element each.
     pub fn new(scene: &Scene, mesh: &Mesh, size: f64) -> Elements {
         let mut elements = Elements::default();
         for t in 0..mesh.triangles.len() {
             let division = division(mesh, t, size);
             let mut run = || {
-                let base = elements.triangle.len() as ElementId;
+                let base = elements.triangle.len() as u32;
                 elements.triangle.extend(std::iter::repeat_n(t as u32, (division * division) as usize));
                 base
             };
             let front = run();
             let double_sided = scene.material(mesh.source[t] as usize).double_sided;
-            let back = if double_sided { run() } else { NO_ELEMENT };
+            let back = if double_sided { run() } else { NO_CELL };
             elements.division.push(division);
             elements.base.push([front, back]);
         }
+        let cells = elements.triangle.len() as u32;
+        elements.first = (0..=cells).collect();
+        elements.cell = (0..cells).collect();
         elements
+    }
+
+    /// The same cells, cell c divided into `pieces[c]` × `pieces[c]` elements (powers of two).
+    pub fn refined(&self, pieces: &[u32]) -> Elements {
+        assert_eq!(pieces.len(), self.cells());
+        let mut first = Vec::with_capacity(pieces.len() + 1);
+        let mut cell = Vec::new();
+        for (c, &d) in pieces.iter().enumerate() {
+            assert!(d.is_power_of_two());
+            first.push(cell.len() as ElementId);
+            cell.extend(std::iter::repeat_n(c as u32, (d * d) as usize));
+        }
+        first.push(cell.len() as ElementId);
+        Elements { first, cell, ..self.clone() }
     }
 
     /// How many elements a size would give, without making them.
@@ -56,12 +79,41 @@ impl Elements {
 
     /// Number of elements.
     pub fn len(&self) -> usize {
-        self.triangle.len()
+        self.cell.len()
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.triangle.is_empty()
+        self.cell.is_empty()
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.triangle.len()
+    }
+
+    /// The elements of a cell.
+    pub fn of_cell(&self, cell: usize) -> Range<ElementId> {
+        self.first[cell]..self.first[cell + 1]
+    }
+
+    /// The cells of a triangle's side; empty if that side carries none.
+    pub fn cells_of(&self, triangle: usize, side: Side) -> Range<usize> {
+        let base = self.base[triangle][side as usize];
+        if base == NO_CELL {
+            return 0..0;
+        }
+        base as usize..base as usize + (self.division[triangle] as usize).pow(2)
+    }
+
+    /// The cell of an element.
+    pub fn cell(&self, element: ElementId) -> usize {
+        self.cell[element as usize] as usize
+    }
+
+    /// Into how many elements the cell of an element is divided: d².
+    pub fn pieces(&self, element: ElementId) -> u32 {
+        self.of_cell(self.cell(element)).len() as u32
     }
 
     /// Cells along an edge of a triangle.
@@ -71,46 +123,56 @@ impl Elements {
 
     /// Whether the triangle has elements on that side.
     pub fn has(&self, triangle: usize, side: Side) -> bool {
-        self.base[triangle][side as usize] != NO_ELEMENT
+        self.base[triangle][side as usize] != NO_CELL
     }
 
     /// The element at barycentric coordinates `uv` of a triangle's side, if that side carries any.
     #[inline]
     pub fn at(&self, triangle: u32, u: f32, v: f32, side: Side) -> Option<ElementId> {
         let base = self.base[triangle as usize][side as usize];
-        if base == NO_ELEMENT {
+        if base == NO_CELL {
             return None;
         }
-        let k = self.division[triangle as usize];
-        Some(base + if k == 1 { 0 } else { cell(u, v, k) })
+        let (cell, u, v) = locate(u, v, self.division[triangle as usize]);
+        let cell = (base + cell) as usize;
+        let (first, end) = (self.first[cell], self.first[cell + 1]);
+        let pieces = end - first;
+        Some(if pieces == 1 { first } else { first + locate(u, v, 1 << (pieces.trailing_zeros() / 2)).0 })
     }
 
     /// Triangle and side of an element.
     pub fn place(&self, element: ElementId) -> (usize, Side) {
-        let t = self.triangle[element as usize] as usize;
-        let back = self.base[t][1] <= element && self.base[t][1] != NO_ELEMENT;
+        let cell = self.cell[element as usize];
+        let t = self.triangle[cell as usize] as usize;
+        let back = self.base[t][1] <= cell && self.base[t][1] != NO_CELL;
         (t, if back { Side::Back } else { Side::Front })
     }
 
-    /// Barycentric corners of an element's cell.
-    pub fn cell_corners(&self, element: ElementId) -> [DVec2; 3] {
+    /// Barycentric corners of an element.
+    pub fn corners(&self, element: ElementId) -> [DVec2; 3] {
         let (t, side) = self.place(element);
-        let k = self.division[t];
-        cell_corners(element - self.base[t][side as usize], k)
+        let cell = self.cell[element as usize];
+        let first = self.first[cell as usize];
+        let pieces = self.first[cell as usize + 1] - first;
+        let [a, b, c] = corners(cell - self.base[t][side as usize], self.division[t]);
+        if pieces == 1 {
+            return [a, b, c];
+        }
+        corners(element - first, pieces.isqrt()).map(|p| a + p.x * (b - a) + p.y * (c - a))
     }
 
     /// Barycentric coordinates of the point of an element that (x, y) in the unit square maps to, area-uniform.
     pub fn sample(&self, element: ElementId, x: f64, y: f64) -> DVec2 {
-        let [a, b, c] = self.cell_corners(element);
+        let [a, b, c] = self.corners(element);
         let (u, v) = triangle_from_square(x, y);
         a + u * (b - a) + v * (c - a)
     }
 
     /// Area of an element, m².
     pub fn area(&self, mesh: &Mesh, element: ElementId) -> f64 {
-        let t = self.triangle[element as usize] as usize;
+        let t = self.triangle[self.cell(element)] as usize;
         let k = f64::from(self.division[t]);
-        mesh.area(t) / (k * k)
+        mesh.area(t) / (k * k * f64::from(self.pieces(element)))
     }
 
     /// Unit normal on an element's own side.
@@ -123,14 +185,14 @@ impl Elements {
 
     /// World position of an element's centroid.
     pub fn centre(&self, mesh: &Mesh, element: ElementId) -> DVec3 {
-        let [a, b, c] = self.cell_corners(element);
-        mesh.point(self.triangle[element as usize] as usize, (a + b + c) / 3.0)
+        let [a, b, c] = self.corners(element);
+        mesh.point(self.place(element).0, (a + b + c) / 3.0)
     }
 
     /// Mean reflectance and emitted exitance (π × luminance, lm/m² per band) of an element. Pictures are averaged
     /// over 16 points, plain materials take one.
     pub fn optics(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> (Bands, Bands) {
-        let t = self.triangle[element as usize] as usize;
+        let (t, _) = self.place(element);
         let material = scene.material(mesh.source[t] as usize);
         let varied = material.base_color_texture.is_some()
             || material.metallic_texture.is_some()
@@ -170,24 +232,27 @@ fn division(mesh: &Mesh, triangle: usize, size: f64) -> u32 {
     (wanted as u32).next_power_of_two()
 }
 
-/// Number of the cell at barycentric (u, v). Row j (0-based, by v) holds 2(k−j)−1 cells: upright and inverted in turn.
+/// The piece at barycentric (u, v) of k × k, and the coordinates within it. Row j (0-based, by v) holds 2(k−j)−1
+/// pieces: upright and inverted in turn.
 #[inline]
-fn cell(u: f32, v: f32, k: u32) -> u32 {
+fn locate(u: f32, v: f32, k: u32) -> (u32, f32, f32) {
+    if k == 1 {
+        return (0, u, v);
+    }
     let n = k as f32;
     let (x, y) = (u * n, v * n);
     let row = (y as u32).min(k - 1);
     let column = (x as u32).min(k - 1 - row);
-    let inverted = (x - column as f32) + (y - row as f32) > 1.0 && column + row + 2 <= k;
-    row * (2 * k - row) + 2 * column + u32::from(inverted)
+    let (u, v) = (x - column as f32, y - row as f32);
+    let upright = row * (2 * k - row) + 2 * column;
+    if u + v > 1.0 && column + row + 2 <= k { (upright + 1, 1.0 - u, 1.0 - v) } else { (upright, u, v) }
 }
 
-fn cell_corners(cell: u32, k: u32) -> [DVec2; 3] {
-    // Rows before row r hold r (2k − r) cells.
-    let mut row = 0;
-    while (row + 1) * (2 * k - (row + 1)) <= cell {
-        row += 1;
-    }
-    let within = cell - row * (2 * k - row);
+/// Barycentric corners of a piece of k × k, in the order that [`locate`]'s coordinates within it refer to.
+fn corners(piece: u32, k: u32) -> [DVec2; 3] {
+    // Rows before row r hold r (2k − r) = k² − (k − r)² pieces.
+    let row = k - f64::from(k * k - piece).sqrt().ceil() as u32;
+    let within = piece - row * (2 * k - row);
     let (column, inverted) = (within / 2, within % 2 == 1);
     let corner = |i: u32, j: u32| DVec2::new(f64::from(i), f64::from(j)) / f64::from(k);
     if inverted {
@@ -206,10 +271,10 @@ mod tests {
     fn every_cell_contains_its_own_points_and_no_others() {
         for k in [1, 2, 4, 16, 64] {
             for id in 0..k * k {
-                let [a, b, c] = cell_corners(id, k);
+                let [a, b, c] = corners(id, k);
                 for (u, v) in [(0.3, 0.3), (0.05, 0.05), (0.9, 0.05), (0.05, 0.9)] {
                     let p = a + u * (b - a) + v * (c - a);
-                    assert_eq!(cell(p.x as f32, p.y as f32, k), id, "k {k} at {p}");
+                    assert_eq!(locate(p.x as f32, p.y as f32, k).0, id, "k {k} at {p}");
                 }
                 let area = 0.5 * (b - a).perp_dot(c - a);
                 assert!((area - 0.5 / f64::from(k * k)).abs() < 1e-12);
@@ -218,9 +283,34 @@ mod tests {
     }
 
     #[test]
+    fn elements_of_divided_cells_contain_their_own_points() {
+        let mut scene = Scene::default();
+        scene.materials.push(Material { double_sided: true, ..Material::default() });
+        scene.add_triangles("t", 0, &[[DVec3::ZERO, DVec3::X, DVec3::Y], [DVec3::Z, DVec3::X, DVec3::Y]]);
+        let mesh = Mesh::new(&scene);
+        let whole = Elements::new(&scene, &mesh, 0.3);
+        let pieces: Vec<u32> = (0..whole.cells()).map(|c| [1, 2, 8, 4][c % 4]).collect();
+        let elements = whole.refined(&pieces);
+        assert_eq!(elements.len(), pieces.iter().map(|d| (d * d) as usize).sum::<usize>());
+        let mut total = 0.0;
+        for e in 0..elements.len() as u32 {
+            let (t, side) = elements.place(e);
+            assert!(elements.cells_of(t, side).contains(&elements.cell(e)));
+            assert!(elements.of_cell(elements.cell(e)).contains(&e));
+            for (x, y) in [(0.3, 0.3), (0.05, 0.9), (0.9, 0.05)] {
+                let p = elements.sample(e, x, y);
+                assert_eq!(elements.at(t as u32, p.x as f32, p.y as f32, side), Some(e));
+            }
+            total += elements.area(&mesh, e);
+        }
+        let both_sides = 2.0 * (mesh.area(0) + mesh.area(1));
+        assert!((total - both_sides).abs() < 1e-12);
+    }
+
+    #[test]
     fn points_outside_by_rounding_still_have_a_cell() {
         for (u, v) in [(-1e-7, 0.0), (1.0, 1e-7), (1e-7, 1.0), (0.5, 0.5), (0.500001, 0.500001)] {
-            assert!(cell(u, v, 16) < 256);
+            assert!(locate(u, v, 16).0 < 256);
         }
     }
 

@@ -96,25 +96,25 @@ impl Exposure {
         self.masks.get(&element) == Some(&0)
     }
 
-    /// Moves a point of the unit square into the exposed part of an element; `None` if there is none.
-    #[inline]
-    pub fn place(&self, element: u32, x: f32, y: f32) -> Option<(f64, f64)> {
-        if !self.masks.is_empty()
-            && let Some(&mask) = self.masks.get(&element)
-        {
-            let open = mask.count_ones();
-            if open == 0 {
-                return None;
-            }
-            // x picks one of the exposed cells and, stretched, the place within it.
-            let scaled = f64::from(x) * f64::from(open);
-            let pick = (scaled as u32).min(open - 1);
-            let cell = nth_bit(mask, pick);
-            let within = (scaled - f64::from(pick)).clamp(0.0, 1.0);
-            return Some((f64::from(cell % 8) / 8.0 + within / 8.0, f64::from(cell / 8) / 8.0 + f64::from(y) / 8.0));
-        }
-        Some((f64::from(x), f64::from(y)))
+    /// The exposed places among the 8 × 8 of an element, one bit each.
+    pub fn mask(&self, element: u32) -> u64 {
+        self.masks.get(&element).copied().unwrap_or(u64::MAX)
     }
+}
+
+/// Moves a point of the unit square into the exposed places of a mask that has any.
+#[inline]
+pub fn open_place(mask: u64, x: f32, y: f32) -> (f64, f64) {
+    if mask == u64::MAX {
+        return (f64::from(x), f64::from(y));
+    }
+    // x picks one of the exposed cells and, stretched, the place within it.
+    let open = mask.count_ones();
+    let scaled = f64::from(x) * f64::from(open);
+    let pick = (scaled as u32).min(open - 1);
+    let cell = nth_bit(mask, pick);
+    let within = (scaled - f64::from(pick)).clamp(0.0, 1.0);
+    (f64::from(cell % 8) / 8.0 + within / 8.0, f64::from(cell / 8) / 8.0 + f64::from(y) / 8.0)
 }
 
 /// Number of the n-th set bit.
@@ -130,10 +130,14 @@ fn examine(tracer: &Tracer, mesh: &Mesh, elements: &Elements, element: u32) -> O
     let (triangle, _) = elements.place(element);
     let normal = elements.normal(mesh, element);
     let frame = frame(normal);
+    let [a, b, c] = elements.corners(element).map(|uv| mesh.point(triangle, uv));
+    let at = |x: f64, y: f64| {
+        let (u, v) = radiosity_scene::elements::triangle_from_square(x, y);
+        a + u * (b - a) + v * (c - a)
+    };
     let sequence = Sequence::new(element, 0x0e59);
     let back = |x: f64, y: f64, u: f32, v: f32, seed: u32| {
-        let point = mesh.point(triangle, elements.sample(element, x, y));
-        let place = Place { point, normal, triangle: triangle as u32 };
+        let place = Place { point: at(x, y), normal, triangle: triangle as u32 };
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
         tracer.first(&tracer.ray(&place, direction, f64::INFINITY), seed) == Found::Back
     };
@@ -150,8 +154,7 @@ fn examine(tracer: &Tracer, mesh: &Mesh, elements: &Elements, element: u32) -> O
     for cell in 0..64 {
         let [dx, dy, _, _] = sequence.point(PILOT + cell);
         let (x, y) = ((f64::from(cell % 8) + f64::from(dx)) / 8.0, (f64::from(cell / 8) + f64::from(dy)) / 8.0);
-        let point = mesh.point(triangle, elements.sample(element, x, y));
-        let place = Place { point, normal, triangle: triangle as u32 };
+        let place = Place { point: at(x, y), normal, triangle: triangle as u32 };
         mask |= u64::from(!is_buried(tracer, &place, element ^ cell << 24)) << cell;
     }
     (mask != u64::MAX).then_some((element, mask))

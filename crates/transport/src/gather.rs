@@ -6,7 +6,7 @@
 //! resolved below the size of the elements.
 
 use crate::rows::IdSpace;
-use crate::{Luminaires, PointReceivers, Progress, Receivers, Shadowing, Stopped};
+use crate::{Columns, Luminaires, Progress, Receivers, Stopped};
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
@@ -14,8 +14,14 @@ use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Elements nearer than this many of their own widths are resolved, not looked up.
-const NEAR: f32 = 3.0;
+/// Elements nearer than this many of their own widths are resolved, not looked up. In a furnished office points are
+/// −0.35 % off with 2, −0.29 % with 6, −0.25 % with 10, which takes a fifth longer.
+const NEAR: f64 = 6.0;
+
+/// The distance below which an element of an area (m²) is resolved, metres.
+pub(crate) fn near(area: f64) -> f64 {
+    NEAR * (2.0 * area).sqrt()
+}
 
 /// Bounces after which even near elements are looked up.
 const DEEPEST: u32 = 4;
@@ -36,8 +42,8 @@ pub struct Gather<'a> {
     pub values: &'a [[f32; 4]],
     /// The luminaires.
     pub luminaires: &'a Luminaires,
-    /// Direct irradiance by light and element.
-    pub columns: &'a [Vec<Bands>],
+    /// Direct irradiance by element and light.
+    pub columns: &'a Columns,
     /// Area by element, m².
     pub area: &'a [f64],
 }
@@ -61,14 +67,15 @@ impl Gather<'_> {
         means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
             for (k, mean) in means.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
-                let seed = receivers.seed(i);
+                let Some(site) = receivers.site(i) else { continue };
+                let (seed, frame) = (receivers.seed(i), frame(site.normal));
                 for half in 0..2 {
                     let sequence = Sequence::new(seed, GATHER + half);
                     let mut sum = [0f64; 3];
                     for index in 0..half_rays {
                         let [u, v, x, y] = sequence.point(index);
-                        let Some(place) = receivers.place(i, x, y) else { continue };
-                        let direction = cosine_direction(&frame(place.normal), f64::from(u), f64::from(v));
+                        let place = site.place(x, y);
+                        let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
                         let arriving = self.arriving(&place, direction, hash(seed ^ index << 1 ^ half));
                         (0..3).for_each(|band| sum[band] += arriving[band]);
                     }
@@ -90,8 +97,8 @@ impl Gather<'_> {
             let id = self.ids.id(found, direction);
             let near = match found {
                 Found::Surface { triangle, uv, side, distance } if bounce < DEEPEST && id != self.ids.nothing() => {
-                    let width = (2.0 * self.area[id as usize]).sqrt() as f32;
-                    (distance < NEAR * width).then_some((triangle as usize, uv, side))
+                    let near = f64::from(distance) < near(self.area[id as usize]);
+                    near.then_some((triangle as usize, uv, side))
                 }
                 _ => None,
             };
@@ -139,11 +146,12 @@ impl Gather<'_> {
         if lights == 0 {
             return [0.0; 3];
         }
-        let received = |light: usize| f64::from(luminance(self.columns[light][element]));
-        let total: f64 = (0..lights).map(received).sum();
+        let received = self.columns.seen_by_light(element);
+        let total: f64 = received.iter().map(|e| f64::from(luminance(*e))).sum();
         let even = 1.0 / lights as f64;
         let probability = |light: usize| {
-            if total > 0.0 { (1.0 - UNGUIDED) * received(light) / total + UNGUIDED * even } else { even }
+            let share = if total > 0.0 { f64::from(luminance(received[light])) / total } else { even };
+            (1.0 - UNGUIDED) * share + UNGUIDED * even
         };
         let mut rest = f64::from(unit(hash(seed ^ 0x3)));
         let mut pick = lights - 1;
@@ -154,10 +162,7 @@ impl Gather<'_> {
             }
             rest -= probability(light);
         }
-        let receivers = PointReceivers { places: std::slice::from_ref(spot) };
-        let once = Shadowing { pilot: 1, mixed: 1 };
-        let (e, _) = self.luminaires.irradiance_seeded(pick, self.tracer, &receivers, 0, &once, hash(seed ^ 0x4));
         let scale = 1.0 / probability(pick);
-        e.map(|e| f64::from(e) * scale)
+        self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4)).map(|e| e * scale)
     }
 }

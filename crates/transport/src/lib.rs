@@ -5,6 +5,7 @@
 //! through rows: [`Luminaires`] gives their light as a direct column each. Receivers are elements while the equation
 //! is solved and points when an answer is read; both go through the same code ([`Receivers`]).
 
+pub mod direct;
 pub mod exposure;
 pub mod gather;
 pub mod luminaires;
@@ -12,9 +13,10 @@ pub mod polygon;
 pub mod receivers;
 pub mod rows;
 
+pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;
 pub use gather::Gather;
-pub use luminaires::{Light, Luminaires, Shadowing};
+pub use luminaires::{Light, Luminaires};
 pub use receivers::{ElementReceivers, PointReceivers, Receivers};
 pub use rows::{HitTable, IdSpace};
 

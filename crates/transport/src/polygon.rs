@@ -93,6 +93,56 @@ impl SphericalTriangle {
     }
 }
 
+/// Least density of a corner relative to the highest: what lies at or below the horizon is still drawn now and then,
+/// as the density between corners is only like the cosine.
+const LEAST_DENSITY: f64 = 0.02;
+
+/// A spherical triangle sampled nearly in proportion to the cosine: the unit square is first warped by the bilinear
+/// density that has the cosines of the triangle's corners (Hart, Pharr, Müller, Lopes, McGuire and Shirley 2020,
+/// "Practical product sampling by fitting and composing warps").
+#[derive(Clone, Copy, Debug)]
+pub struct CosineTriangle {
+    triangle: SphericalTriangle,
+    normal: DVec3,
+    /// Density at the corners (0, 0), (1, 0), (0, 1), (1, 1) of the unit square, of mean 1.
+    density: [f64; 4],
+}
+
+impl CosineTriangle {
+    /// The triangle `corners` as seen from `point` with unit `normal`; `None` where it degenerates.
+    pub fn new(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> Option<CosineTriangle> {
+        let triangle = SphericalTriangle::new(point, corners)?;
+        // Directions run from corner b (y = 0) to the edge from a (x = 0) to c (x = 1).
+        let cosines = [triangle.b, triangle.b, triangle.a, triangle.c].map(|d| d.dot(normal).max(0.0));
+        let highest = cosines.iter().copied().fold(0.0, f64::max);
+        if highest <= 0.0 {
+            return None;
+        }
+        let density = cosines.map(|c| c.max(LEAST_DENSITY * highest));
+        let mean = density.iter().sum::<f64>() / 4.0;
+        Some(CosineTriangle { triangle, normal, density: density.map(|d| d / mean) })
+    }
+
+    /// The unit direction that (x, y) in the unit square maps to, and cos θ/π over its density.
+    pub fn direction(&self, x: f64, y: f64) -> (DVec3, f64) {
+        let [d00, d10, d01, d11] = self.density;
+        // The marginal density in y, then the conditional one in x: both linear.
+        let y = linear(y, d00 + d10, d01 + d11);
+        let (low, high) = (d00 + y * (d01 - d00), d10 + y * (d11 - d10));
+        let x = linear(x, low, high);
+        let direction = self.triangle.direction(x, y);
+        let cosine = direction.dot(self.normal).max(0.0);
+        let density = low + x * (high - low);
+        (direction, cosine * self.triangle.solid_angle / (std::f64::consts::PI * density))
+    }
+}
+
+/// Inverts the distribution on [0, 1] whose density runs linearly from `a` to `b`.
+fn linear(x: f64, a: f64, b: f64) -> f64 {
+    let root = (a * a + x * (b * b - a * a)).max(0.0).sqrt();
+    (x * (a + b) / (a + root)).min(1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -146,5 +196,15 @@ mod tests {
         }
         let sampled = sum / f64::from(n * n) * triangle.solid_angle / std::f64::consts::PI;
         assert!((sampled - exact).abs() < 1e-5 * exact, "{sampled} {exact}");
+
+        // Drawn by the cosine, the weights have the same mean and hardly vary.
+        let triangle = CosineTriangle::new(DVec3::ZERO, DVec3::Z, corners).unwrap();
+        let weight = |i: i32| {
+            triangle.direction((f64::from(i % n) + 0.5) / f64::from(n), (f64::from(i / n) + 0.5) / f64::from(n)).1
+        };
+        let mean = (0..n * n).map(weight).sum::<f64>() / f64::from(n * n);
+        assert!((mean - exact).abs() < 1e-5 * exact, "{mean} {exact}");
+        let spread = ((0..n * n).map(|i| (weight(i) - mean).powi(2)).sum::<f64>() / f64::from(n * n)).sqrt();
+        assert!(spread < 0.15 * mean, "{spread} of {mean}");
     }
 }

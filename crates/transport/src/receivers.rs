@@ -1,13 +1,37 @@
 //! Where light is asked for: elements while the equation is solved, points when an answer is read.
 
 use crate::Exposure;
-use crate::exposure::is_buried;
+use crate::exposure::{is_buried, open_place};
+use crate::gather::near;
 use glam::DVec3;
+use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Elements, Mesh};
 use radiosity_trace::{Place, Tracer};
 
 /// Places keep off the border of their element by about this many welding tolerances (millionths of the scene).
 const BORDER: f64 = 4.0;
+
+/// Where a receiver lies: all that its places need, worked out once.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    origin: DVec3,
+    edges: [DVec3; 2],
+    /// Unit normal.
+    pub normal: DVec3,
+    triangle: u32,
+    mask: u64,
+}
+
+impl Site {
+    /// The place that (x, y) in the unit square maps to.
+    #[inline]
+    pub fn place(&self, x: f32, y: f32) -> Place {
+        let (x, y) = open_place(self.mask, x, y);
+        let (u, v) = triangle_from_square(x, y);
+        let point = self.origin + u * self.edges[0] + v * self.edges[1];
+        Place { point, normal: self.normal, triangle: self.triangle }
+    }
+}
 
 /// A list of places that receive light.
 pub trait Receivers: Sync {
@@ -17,15 +41,17 @@ pub trait Receivers: Sync {
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// The place that (x, y) in the unit square maps to, on receiver `i`; `None` if nothing of it is exposed.
-    fn place(&self, i: usize, x: f32, y: f32) -> Option<Place>;
+    /// Where receiver `i` lies; `None` if nothing of it is exposed.
+    fn site(&self, i: usize) -> Option<Site>;
     /// Whether a place of the receiver lies inside a solid and must not be counted. Asked only where a ray from the
     /// place ended at once.
     fn buried(&self, _tracer: &Tracer, _place: &Place, _seed: u32) -> bool {
         false
     }
-    /// Whether the receiver is larger than a point.
-    fn has_area(&self) -> bool;
+    /// How many places to look at where a whole cell would get `wanted`.
+    fn places(&self, i: usize, wanted: u32) -> u32;
+    /// The distance up to which the receiver is not looked up as a whole, metres; `None` for points.
+    fn near(&self, i: usize) -> Option<f64>;
     /// A number that fixes the receiver's random choices: the same for the same place whatever else is asked.
     fn seed(&self, i: usize) -> u32;
 }
@@ -45,19 +71,23 @@ impl Receivers for ElementReceivers<'_> {
         self.elements.len()
     }
 
-    fn place(&self, i: usize, x: f32, y: f32) -> Option<Place> {
-        let (x, y) = self.exposure.place(i as u32, x, y)?;
+    fn site(&self, i: usize) -> Option<Site> {
         let element = i as u32;
+        let mask = self.exposure.mask(element);
+        if mask == 0 {
+            return None;
+        }
         let (triangle, _) = self.elements.place(element);
-        let uv = self.elements.sample(element, x, y);
-        let point = self.mesh.point(triangle, uv);
+        let [a, b, c] = self.elements.corners(element).map(|uv| self.mesh.point(triangle, uv));
         // Away from the border by more than rounding moves a ray's origin: a place within a billionth of a wall's foot
         // would let rays start inside the wall.
         let inset = (BORDER * self.mesh.tolerance / self.elements.area(self.mesh, element).sqrt()).min(0.25);
-        Some(Place {
-            point: point + inset * (self.elements.centre(self.mesh, element) - point),
+        Some(Site {
+            origin: a + inset * ((a + b + c) / 3.0 - a),
+            edges: [b - a, c - a].map(|edge| (1.0 - inset) * edge),
             normal: self.elements.normal(self.mesh, element),
             triangle: triangle as u32,
+            mask,
         })
     }
 
@@ -65,8 +95,13 @@ impl Receivers for ElementReceivers<'_> {
         is_buried(tracer, place, seed)
     }
 
-    fn has_area(&self) -> bool {
-        true
+    /// Elements of a divided cell share its places; two are the least that can average over an element.
+    fn places(&self, i: usize, wanted: u32) -> u32 {
+        wanted.div_ceil(self.elements.pieces(i as u32)).max(2)
+    }
+
+    fn near(&self, i: usize) -> Option<f64> {
+        Some(near(self.elements.area(self.mesh, i as u32)))
     }
 
     fn seed(&self, i: usize) -> u32 {
@@ -85,13 +120,18 @@ impl Receivers for PointReceivers<'_> {
         self.places.len()
     }
 
-    fn place(&self, i: usize, _x: f32, _y: f32) -> Option<Place> {
-        let place = self.places[i];
-        (place.normal != DVec3::ZERO).then_some(place)
+    fn site(&self, i: usize) -> Option<Site> {
+        let Place { point, normal, triangle } = self.places[i];
+        let site = Site { origin: point, edges: [DVec3::ZERO; 2], normal, triangle, mask: u64::MAX };
+        (normal != DVec3::ZERO).then_some(site)
     }
 
-    fn has_area(&self) -> bool {
-        false
+    fn places(&self, _i: usize, _wanted: u32) -> u32 {
+        1
+    }
+
+    fn near(&self, _i: usize) -> Option<f64> {
+        None
     }
 
     fn seed(&self, i: usize) -> u32 {

@@ -4,7 +4,8 @@
 //! what ray m met: an element, a sky patch, or nothing. Each entry weighs 1/M, so a row sums to exactly one and energy
 //! cannot appear. The rays of a row are two independently scrambled halves: half their difference is the standard
 //! error of the row, live and for any right-hand side. Doubling M appends columns to the table; nothing is traced
-//! twice. It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
+//! twice. The elements of a divided cell share its M rays: a receiver sees many of them and averages their noise out.
+//! It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
 
 use crate::{Progress, Receivers, Stopped};
 use radiosity_scene::{Elements, SkyPatches};
@@ -12,6 +13,7 @@ use radiosity_solve::{AreaSpace, Transport};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Found, Tracer};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The one space of ids: surface elements, then sky patches, then nothing.
@@ -66,7 +68,11 @@ fn trace_row(
     mut out: impl FnMut(usize, u32),
 ) {
     let seed = receivers.seed(i);
-    let mut kept = None;
+    let Some(site) = receivers.site(i) else {
+        (from..to).for_each(|_| (0..2).for_each(|half| out(half, ids.nothing())));
+        return;
+    };
+    let frame = frame(site.normal);
     for half in 0..2 {
         let sequence = Sequence::new(seed, stream + half);
         for index in from..to {
@@ -74,12 +80,7 @@ fn trace_row(
             let salt = hash(seed ^ index) ^ half;
             let mut id = ids.nothing();
             for attempt in 0..ATTEMPTS {
-                let Some(place) = receivers.place(i, x, y) else { break };
-                let frame = match kept {
-                    Some((normal, frame)) if normal == place.normal => frame,
-                    _ => frame(place.normal),
-                };
-                kept = Some((place.normal, frame));
+                let place = site.place(x, y);
                 let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
                 let found = tracer.first(&tracer.ray(&place, direction, f64::INFINITY), salt);
                 id = ids.id(found, direction);
@@ -95,12 +96,24 @@ fn trace_row(
     }
 }
 
-/// Rays of one block of columns: the ids of `width` rays per receiver, the first half of them from the first of the
+/// Rays of one block of columns. Row i is `ids[starts[i]..starts[i + 1]]`, the first half of it from the first of the
 /// two independent sequences.
 #[derive(Clone, Debug)]
 struct Block {
-    width: usize,
+    starts: Vec<usize>,
     ids: Vec<u32>,
+}
+
+impl Block {
+    fn row(&self, i: usize) -> &[u32] {
+        &self.ids[self.starts[i]..self.starts[i + 1]]
+    }
+}
+
+/// Rays of a row where a whole cell gets `columns`: an element of a divided cell gets its share, and at least one ray
+/// in each half.
+fn width(columns: usize, pieces: usize) -> usize {
+    2 * (columns / 2).div_ceil(pieces)
 }
 
 /// The table of hit ids of all elements.
@@ -110,6 +123,8 @@ pub struct HitTable {
     blocks: Vec<Block>,
     columns: usize,
     all_ids: usize,
+    /// Rays of each element so far.
+    traced: Vec<u32>,
     /// Label of each element: elements that see each other, directly or through others, share one.
     parts: Vec<u32>,
 }
@@ -120,23 +135,23 @@ const ROWS: u32 = 0x0100;
 impl HitTable {
     /// An empty table for elements of the given areas (m²).
     pub fn new(area: Vec<f64>, ids: &IdSpace) -> HitTable {
-        {
-            let parts = (0..area.len() as u32).collect();
-            HitTable { space: AreaSpace { area }, blocks: Vec::new(), columns: 0, all_ids: ids.len(), parts }
-        }
+        let n = area.len();
+        let parts = (0..n as u32).collect();
+        let traced = vec![0; n];
+        HitTable { space: AreaSpace { area }, blocks: Vec::new(), columns: 0, all_ids: ids.len(), traced, parts }
     }
 
-    /// M: rays per element so far.
+    /// M: rays per cell so far.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Bytes of the table with `columns` rays for each of `elements`.
-    pub fn bytes(elements: usize, columns: usize) -> usize {
-        elements * columns * size_of::<u32>()
+    /// Bytes of the table with `columns` rays for each of `cells`.
+    pub fn bytes(cells: usize, columns: usize) -> usize {
+        cells * columns * size_of::<u32>()
     }
 
-    /// Appends columns up to `columns` rays per element (an even number).
+    /// Appends columns up to `columns` rays per cell (an even number).
     ///
     /// # Errors
     /// [`Stopped`] if `progress` says so; the table is then as it was.
@@ -148,21 +163,27 @@ impl HitTable {
         columns: usize,
         progress: &impl Progress,
     ) -> Result<(), Stopped> {
-        assert_eq!(receivers.len(), self.space.area.len());
-        let (from, to) = (self.columns / 2, columns.div_ceil(2));
-        if to <= from {
-            return Ok(());
-        }
-        const CHUNK: usize = 256;
-        let half = to - from;
-        let width = 2 * half;
         let n = receivers.len();
-        let mut block = vec![0u32; width * n];
+        assert_eq!(n, self.space.area.len());
+        let columns = columns.next_multiple_of(2);
+        let Some(more) = columns.checked_sub(self.columns).filter(|more| *more > 0) else { return Ok(()) };
+        const CHUNK: usize = 256;
+        let mut starts = Vec::with_capacity(n + 1);
+        let mut end = 0;
+        for i in 0..n {
+            starts.push(end);
+            end += width(more, ids.elements.pieces(i as u32) as usize);
+        }
+        starts.push(end);
+        let mut block = Block { starts, ids: vec![0u32; end] };
         let done = AtomicUsize::new(0);
-        block.par_chunks_mut(width * CHUNK).enumerate().try_for_each(|(chunk, rows)| {
-            for (k, row) in rows.chunks_exact_mut(width).enumerate() {
-                let mut next = [0, half];
-                trace_row(tracer, ids, receivers, chunk * CHUNK + k, (from as u32, to as u32, ROWS), |half, id| {
+        split_rows(&mut block.ids, &block.starts, CHUNK).into_par_iter().try_for_each(|(rows, mut ids_left)| {
+            for i in rows.clone() {
+                let row;
+                (row, ids_left) = ids_left.split_at_mut(block.starts[i + 1] - block.starts[i]);
+                let half = row.len() / 2;
+                let (from, mut next) = (self.traced[i] / 2, [0, half]);
+                trace_row(tracer, ids, receivers, i, (from, from + half as u32, ROWS), |half, id| {
                     row[next[half]] = id;
                     next[half] += 1;
                 });
@@ -170,17 +191,19 @@ impl HitTable {
                 row[..half].sort_unstable();
                 row[half..].sort_unstable();
             }
-            let rows = rows.len() / width;
-            progress.step(done.fetch_add(rows, Ordering::Relaxed) + rows, n).then_some(()).ok_or(Stopped)
+            progress.step(done.fetch_add(rows.len(), Ordering::Relaxed) + rows.len(), n).then_some(()).ok_or(Stopped)
         })?;
-        self.join_parts(&block, width);
-        self.blocks.push(Block { width, ids: block });
-        self.columns = 2 * to;
+        self.join_parts(&block);
+        for (traced, starts) in self.traced.iter_mut().zip(block.starts.windows(2)) {
+            *traced += (starts[1] - starts[0]) as u32;
+        }
+        self.blocks.push(block);
+        self.columns = columns;
         Ok(())
     }
 
     /// Joins the labels of elements that rows connect, and numbers them anew from 0.
-    fn join_parts(&mut self, ids: &[u32], width: usize) {
+    fn join_parts(&mut self, block: &Block) {
         let n = self.parts.len();
         // Labels as a forest: each points to an element of its set with a number no larger than its own.
         let mut first = vec![u32::MAX; n];
@@ -197,9 +220,9 @@ impl HitTable {
             }
             i
         }
-        for (i, row) in ids.chunks_exact(width).enumerate() {
+        for i in 0..n {
             let mut own = root(&mut parent, i as u32);
-            for &id in row.iter().filter(|id| (**id as usize) < n) {
+            for &id in block.row(i).iter().filter(|id| (**id as usize) < n) {
                 let other = root(&mut parent, id);
                 let (low, high) = (own.min(other), own.max(other));
                 parent[high as usize] = low;
@@ -218,7 +241,7 @@ impl HitTable {
         }
     }
 
-    /// Mean of `values` (by id) over each row: h_i = (1/M) Σ_m values[id(i, m)].
+    /// Mean of `values` (by id) over each row: h_i = (1/M_i) Σ_m values[id(i, m)].
     pub fn rows_mean(&self, values: &[[f32; 4]]) -> Vec<[f32; 4]> {
         self.halves(values).into_iter().map(|[a, b]| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect()
     }
@@ -226,12 +249,14 @@ impl HitTable {
     /// The same for the two independent halves of each row.
     pub fn halves(&self, values: &[[f32; 4]]) -> Vec<[[f32; 4]; 2]> {
         assert_eq!(values.len(), self.all_ids);
-        let share = 2.0 / self.columns as f32;
         let n = self.space.area.len();
         (0..n)
             .into_par_iter()
             .with_min_len(256)
-            .map(|i| self.row(i, values).map(|sum| sum.map(|x| x * share)))
+            .map(|i| {
+                let share = 2.0 / self.traced[i] as f32;
+                self.row(i, values).map(|sum| sum.map(|x| x * share))
+            })
             .collect()
     }
 
@@ -239,8 +264,8 @@ impl HitTable {
     fn row(&self, i: usize, values: &[[f32; 4]]) -> [[f32; 4]; 2] {
         let mut sums = [[0f32; 4]; 2];
         for block in &self.blocks {
-            let row = &block.ids[i * block.width..(i + 1) * block.width];
-            for (sum, ids) in sums.iter_mut().zip(row.chunks_exact(block.width / 2)) {
+            let row = block.row(i);
+            for (sum, ids) in sums.iter_mut().zip(row.chunks_exact(row.len() / 2)) {
                 for &id in ids {
                     let value = values[id as usize];
                     for k in 0..4 {
@@ -252,10 +277,23 @@ impl HitTable {
         sums
     }
 
-    /// The ids of a row, all of weight 1/M.
+    /// The ids of a row, all of the same weight.
     pub fn row_ids(&self, i: usize) -> impl Iterator<Item = u32> + '_ {
-        self.blocks.iter().flat_map(move |block| block.ids[i * block.width..(i + 1) * block.width].iter().copied())
+        self.blocks.iter().flat_map(move |block| block.row(i).iter().copied())
     }
+}
+
+/// Cuts `ids` into chunks of `chunk` rows, each with the range of its rows.
+fn split_rows<'a>(mut ids: &'a mut [u32], starts: &[usize], chunk: usize) -> Vec<(Range<usize>, &'a mut [u32])> {
+    let n = starts.len() - 1;
+    let mut chunks = Vec::with_capacity(n.div_ceil(chunk));
+    for first in (0..n).step_by(chunk) {
+        let end = (first + chunk).min(n);
+        let (own, rest) = ids.split_at_mut(starts[end] - starts[first]);
+        chunks.push((first..end, own));
+        ids = rest;
+    }
+    chunks
 }
 
 impl Transport for HitTable {
@@ -280,8 +318,8 @@ impl Transport for HitTable {
                     value[k] = b[first + k] as f32;
                 }
             }
-            let share = 1.0 / self.columns.max(1) as f64;
             h.par_chunks_exact_mut(bands).with_min_len(256).enumerate().take(n).for_each(|(i, h)| {
+                let share = 1.0 / f64::from(self.traced[i].max(1));
                 let [a, c] = self.row(i, &values);
                 for k in 0..count {
                     h[first + k] = (f64::from(a[k]) + f64::from(c[k])) * share;

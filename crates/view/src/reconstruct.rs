@@ -67,14 +67,16 @@ impl Field {
             for side in sides(t) {
                 base[t][side as usize] = sums.len();
                 sums.resize(sums.len() + corner(0, k, k) + 1, [0.0; 4]);
+                let cells = elements.cells_of(t, side);
                 for_each_cell(k, |cell, corners| {
-                    let centroid =
-                        corners.iter().fold(DVec2::ZERO, |sum, &(i, j)| sum + DVec2::new(i.into(), j.into()))
-                            / (3.0 * f64::from(k));
-                    let element = elements.at(t as u32, centroid.x as f32, centroid.y as f32, side);
-                    debug_assert!(element.is_some_and(|e| elements.place(e) == (t, side)), "cell {cell}");
-                    let Some(element) = element else { return };
-                    let (w, value) = (weight[element as usize], values[element as usize]);
+                    // The mean over the exposed part of the cell's elements.
+                    let (mut w, mut value) = (0.0, [0f64; 3]);
+                    for element in elements.of_cell(cells.start + cell as usize) {
+                        let own = weight[element as usize];
+                        w += own;
+                        (0..3).for_each(|band| value[band] += own * f64::from(values[element as usize][band]));
+                    }
+                    let value = value.map(|v| if w > 0.0 { (v / w) as f32 } else { 0.0 });
                     for &(i, j) in &corners {
                         match shared_corner(mesh, t, side, (i, j), k) {
                             Some(key) => add(shared.entry(key).or_default(), w, value),

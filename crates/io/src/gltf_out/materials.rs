@@ -51,13 +51,15 @@ impl<'a> Materials<'a> {
 
     /// How unlit vertices of a scene's material make their colour.
     pub fn glow(&self, material: usize) -> Glow {
-        match self.scene.materials.get(material).filter(|m| m.emits()) {
-            None => Glow { tint: [1.0; 3], emissive: [0.0; 3] },
+        let Some(m) = self.scene.materials.get(material) else { return Glow { tint: [1.0; 3], emissive: [0.0; 3] } };
+        let plain = m.base_color_texture.is_none();
+        match m.emits() {
+            // A picture stays the material's and multiplies; a plain colour moves into the vertices, where light that
+            // is brighter than white on white can still be seen on grey.
+            false if !plain => Glow { tint: [1.0; 3], emissive: [0.0; 3] },
             // The picture of a lamp shows its emission; without pictures the reflected light fits in as well.
-            Some(m) if m.emissive_texture.is_some() || m.base_color_texture.is_some() => {
-                Glow { tint: [0.0; 3], emissive: m.emissive }
-            }
-            Some(m) => Glow { tint: [m.base_color[0], m.base_color[1], m.base_color[2]], emissive: m.emissive },
+            true if !plain || m.emissive_texture.is_some() => Glow { tint: [0.0; 3], emissive: m.emissive },
+            _ => Glow { tint: [m.base_color[0], m.base_color[1], m.base_color[2]], emissive: m.emissive },
         }
     }
 
@@ -120,11 +122,13 @@ impl<'a> Materials<'a> {
         let own = extensions(json);
         own.remove("KHR_materials_emissive_strength");
         own.insert("KHR_materials_unlit".into(), json!({}));
-        if !self.scene.materials.get(material).is_some_and(|m| m.emits()) {
+        let lamp = self.scene.materials.get(material).is_some_and(|m| m.emits());
+        if !lamp && self.scene.materials.get(material).is_none_or(|m| m.base_color_texture.is_some()) {
             return;
         }
-        // A lamp: its vertices carry the emission, its picture of emission takes the place of the base colour's.
-        let picture = json.get("emissiveTexture").cloned();
+        // The vertices carry the colour, a lamp's its emission; the picture of the emission takes the place of the base
+        // colour's.
+        let picture = json.get("emissiveTexture").filter(|_| lamp).cloned();
         let pbr = json.entry("pbrMetallicRoughness").or_insert_with(|| json!({}));
         if let Some(pbr) = pbr.as_object_mut() {
             let alpha = pbr.get("baseColorFactor").and_then(|c| c.get(3)).and_then(Value::as_f64).unwrap_or(1.0);

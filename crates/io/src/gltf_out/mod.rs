@@ -9,8 +9,8 @@
 //! What a value means: irradiance E in lx per band. In a lightmap E = texel (decoded) × `intensity` of MOZ_lightmap;
 //! three.js adds `texel · intensity · albedo/π` to the reflected light, so it shows the luminance B = albedo · E/π
 //! in cd/m², times [`Style`]'s exposure. Vertex light is the float attribute `_IRRADIANCE` in lx; the author's
-//! COLOR_0 stays. Unlit vertices carry COLOR_0 = author's colour × E/π × exposure, cut at 1, and any
-//! viewer shows them.
+//! COLOR_0 stays. Unlit vertices carry COLOR_0 = author's colour × E/π × exposure through the curve that pictures are
+//! shown with, and any viewer shows them.
 
 mod glb;
 mod materials;
@@ -102,7 +102,7 @@ pub enum Style {
     Vertices,
     /// KHR_materials_unlit with the light in COLOR_0.
     Unlit {
-        /// Factor from cd/m² to the viewer's brightness (1 is white).
+        /// Factor from cd/m² to the viewer's brightness; 1 is a little below white, which 8 reaches.
         exposure: f32,
     },
 }

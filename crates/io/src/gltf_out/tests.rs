@@ -266,7 +266,7 @@ fn unlit_colours_are_exposed_luminance_and_lamps_shine() {
     scene.add_quad("lamp", 1, square.map(|p| p + DVec3::Z));
     let even = |points: &[DVec3]| Light::Vertex { irradiance: vec![[std::f32::consts::PI; 3]; points.len()] };
     let lit = halved(&scene, even);
-    let bytes = lit_glb(&scene, None, &lit, &Style::Unlit { exposure: 0.02 }).unwrap();
+    let bytes = lit_glb(&scene, None, &lit, &Style::Unlit { exposure: 0.01 }).unwrap();
     let mut faults = radiosity_scene::Faults::default();
     let document = Document::read("t.glb", &bytes, &Memory::default(), &mut faults).unwrap();
     let color = |mesh: usize| {
@@ -277,12 +277,12 @@ fn unlit_colours_are_exposed_luminance_and_lamps_shine() {
         let color = primitive["attributes"]["COLOR_0"].as_u64().unwrap() as usize;
         (document.read_colors(color).unwrap()[0], factor)
     };
-    // The wall: E/π = 1 cd/m² times the exposure, the albedo stays in the material.
-    let (wall, albedo) = color(0);
-    assert!((wall[0] - 0.02).abs() < 1e-6 && albedo == 0.5, "{wall:?}");
+    // The wall: E/π = 1 cd/m² times the albedo and the exposure.
+    let (wall, factor) = color(0);
+    assert!((wall[0] - 0.005).abs() < 1e-6 && factor == 1.0, "{wall:?}");
     // The lamp: 40 cd/m² and what it reflects.
     let (lamp, factor) = color(1);
-    assert!((lamp[0] - 0.02 * 40.5).abs() < 1e-6 && (lamp[2] - 0.02 * 0.5).abs() < 1e-6 && factor == 1.0, "{lamp:?}");
+    assert!((lamp[0] - 0.01 * 40.5).abs() < 1e-6 && (lamp[2] - 0.01 * 0.5).abs() < 1e-6 && factor == 1.0, "{lamp:?}");
 }
 
 #[test]
@@ -346,4 +346,29 @@ fn nothing_that_is_not_finite_is_written() {
             }
         }
     }
+}
+
+/// Cut at 1, the sun on a grey floor was as dark as the shade beside it, and orange light turned yellow.
+#[test]
+fn unlit_sun_is_brighter_than_shade_and_keeps_its_hue() {
+    let mut scene = Scene {
+        materials: vec![Material { base_color: [0.3, 0.3, 0.3, 1.0], ..Material::default() }],
+        ..Scene::default()
+    };
+    let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+    scene.add_quad("floor", 0, square);
+    let color = |light: f32| {
+        let even =
+            |points: &[DVec3]| Light::Vertex { irradiance: vec![[light, 0.5 * light, 0.1 * light]; points.len()] };
+        let bytes =
+            lit_glb(&scene, None, &halved(&scene, even), &Style::Unlit { exposure: std::f32::consts::PI }).unwrap();
+        let mut faults = radiosity_scene::Faults::default();
+        let document = Document::read("t.glb", &bytes, &Memory::default(), &mut faults).unwrap();
+        let accessor = document.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"].as_u64().unwrap() as usize;
+        document.read_colors(accessor).unwrap()[0]
+    };
+    let (shade, sun) = (color(1.2), color(6.0));
+    assert!((shade[0] - 0.36).abs() < 1e-6, "{shade:?}");
+    assert!(sun[0] > 2.0 * shade[0] && sun[0] < 1.0, "{sun:?}");
+    assert!((0.45..0.65).contains(&(sun[1] / sun[0])), "{sun:?}");
 }

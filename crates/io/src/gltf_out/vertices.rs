@@ -154,6 +154,26 @@ pub(super) struct Glow {
     pub emissive: [f32; 3],
 }
 
+/// Colours end at 1: the curve that pictures are shown with, linear up to one half, then a shoulder that reaches white at
+/// 8 and keeps hues until they fade to white. A plain cut at 1 would show sun and shade alike.
+fn display(color: [f32; 3]) -> [f32; 3] {
+    const KNEE: f32 = 0.5;
+    const WHITE: f32 = 8.0;
+    let color = color.map(|c| if c >= 0.0 { c.min(f32::MAX) } else { 0.0 });
+    let peak = color[0].max(color[1]).max(color[2]);
+    if peak <= KNEE {
+        return color;
+    }
+    let range = 1.0 - KNEE;
+    let end = 1.0 - (-(WHITE - KNEE) / range).exp();
+    let mapped = KNEE + range * (1.0 - (-(peak - KNEE) / range).exp()) / end;
+    let fade = ((peak - 1.0) / (WHITE - 1.0)).clamp(0.0, 1.0);
+    color.map(|c| {
+        let hue = c / peak * mapped;
+        (hue + fade * (mapped - hue)).min(1.0)
+    })
+}
+
 /// Adds the light to the attributes of a primitive; returns the texture coordinate set of its lightmap.
 pub(super) fn add_light(
     builder: &mut Builder,
@@ -186,11 +206,10 @@ pub(super) fn add_light(
                     flat
                 });
                 let own = own.unwrap_or([1.0; 4]);
-                for band in 0..3 {
+                values.extend(display(std::array::from_fn(|band| {
                     let reflected = glow.tint[band] * own[band] * e[band] / std::f32::consts::PI;
-                    // Colours end at 1; what is brighter than the exposure's white is cut there.
-                    values.push((exposure * (reflected + glow.emissive[band])).clamp(0.0, 1.0));
-                }
+                    exposure * (reflected + glow.emissive[band])
+                })));
                 values.push(own[3].clamp(0.0, 1.0));
             }
             let accessor = builder.floats(&values, 4, false);

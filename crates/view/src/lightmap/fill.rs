@@ -4,20 +4,24 @@
 use super::Texel;
 use radiosity_scene::Bands;
 
-/// A row-major picture of `page` = width and height with `values[i]` at `texels[i]`.
+/// A row-major picture of `page` = width and height with `values[i]` at `texels[i]`, the mean where a texel is named
+/// more than once.
 ///
 /// Texels outside the page and texels without a finite value are skipped; a page without any value is black.
 pub fn fill(page: [u32; 2], texels: &[Texel], values: &[Bands]) -> Vec<Bands> {
     let [width, height] = page.map(|side| side as usize);
-    let mut level = Level { width, height, known: vec![None; width * height] };
+    let mut sums = vec![([0_f64; 3], 0_u32); width * height];
     for (texel, value) in texels.iter().zip(values) {
         let (x, y) = (usize::from(texel.x), usize::from(texel.y));
         if x < width && y < height && value.iter().all(|v| v.is_finite()) {
-            level.known[y * width + x] = Some(*value);
+            let (sum, count) = &mut sums[y * width + x];
+            *sum = std::array::from_fn(|band| sum[band] + f64::from(value[band]));
+            *count += 1;
         }
     }
+    let mean = |(sum, count): ([f64; 3], u32)| (count > 0).then(|| sum.map(|s| (s / f64::from(count)) as f32));
 
-    let mut pyramid = vec![level];
+    let mut pyramid = vec![Level { width, height, known: sums.into_iter().map(mean).collect() }];
     while let Some(last) = pyramid.last().filter(|level| level.width > 1 || level.height > 1) {
         let coarser = last.halved();
         pyramid.push(coarser);
@@ -74,7 +78,8 @@ mod tests {
     #[test]
     fn empty_texels_continue_their_neighbours() {
         let at = |x, y| Texel { x, y, triangle: 0, uv: Vec2::ZERO };
-        let picture = fill([7, 5], &[at(0, 0), at(6, 4), at(1, 3)], &[[1.0; 3], [3.0; 3], [f32::NAN; 3]]);
+        let texels = [at(0, 0), at(6, 4), at(1, 3), at(6, 4)];
+        let picture = fill([7, 5], &texels, &[[1.0; 3], [2.0; 3], [f32::NAN; 3], [4.0; 3]]);
         assert_eq!(picture.len(), 35);
         assert_eq!((picture[0], picture[1], picture[34]), ([1.0; 3], [1.0; 3], [3.0; 3]));
         assert!(picture.iter().flatten().all(|v| (1.0..=3.0).contains(v)));

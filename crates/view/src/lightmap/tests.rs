@@ -415,3 +415,47 @@ fn both_sides_of_a_seam_agree() {
         assert!((old[0] - new[0]).abs() < 0.15, "{old:?} {new:?}");
     }
 }
+
+/// A bar of shadow, a third of a texel wide and askew: with one point for each texel it falls into dashes, with the
+/// means it keeps its darkness everywhere; and where light is even no point is added.
+#[test]
+fn thin_shadows_do_not_fall_into_dashes() {
+    let mut mesh = Mesh::default();
+    mesh.add(0, &[DVec3::ZERO, DVec3::X * 9.0, DVec3::new(9.0, 9.0, 0.0), DVec3::Y * 9.0], &[[0, 1, 2], [0, 2, 3]]);
+    let atlas = unwrapped(&mesh, &UnwrapParams { texels_per_metre: 4.0, ..UnwrapParams::default() });
+    let point = |texel: &Texel| {
+        let [a, b, c] = mesh.triangles[texel.triangle as usize].map(|v| mesh.positions[v as usize]);
+        let [u, v] = texel.uv.as_dvec2().to_array();
+        a * (1.0 - u - v) + b * u + c * v
+    };
+    let bar = |p: DVec3| (p.x - 4.0 - 0.2 * (p.y - 4.5)).abs() < 1.0 / 24.0;
+    let light = |texels: &[Texel]| -> Vec<[f32; 3]> {
+        texels.iter().map(|texel| [if bar(point(texel)) { 0.0 } else { 1.0 }; 3]).collect()
+    };
+    let mut texels = atlas.texels(0);
+    let mut values = light(&texels);
+    let even = vec![[1.0; 3]; texels.len()];
+    assert!(atlas.finer(0, &texels, &even, 0.1, 16).is_empty());
+    // Darkness in every row of texels; the bar is 4/12 of a texel wide.
+    let missing = |picture: &[[f32; 3]]| -> Vec<f64> {
+        let [width, height] = atlas.pages[0].map(|side| side as usize);
+        let rows = (2..height - 2).map(|y| (0..width).map(|x| 1.0 - f64::from(picture[y * width + x][0])).sum());
+        rows.filter(|sum: &f64| sum.is_finite()).collect()
+    };
+    let worst = |rows: &[f64]| rows.iter().fold(0.0_f64, |worst, sum| worst.max((sum - 0.34).abs()));
+    let before = missing(&fill(atlas.pages[0], &texels, &values));
+    let first = texels.len();
+    for round in 0.. {
+        let more = atlas.finer(0, &texels, &values, 0.1, 16);
+        assert!(round < 5, "the bar runs through five texels of a row at most");
+        if more.is_empty() {
+            break;
+        }
+        values.extend(light(&more));
+        texels.extend(more);
+    }
+    assert!(texels[first..].iter().all(|texel| texel.uv.min_element() >= 0.0 && texel.uv.element_sum() <= 1.0));
+    let after = missing(&fill(atlas.pages[0], &texels, &values));
+    assert!(worst(&before) > 0.6 && worst(&after) < 0.12, "{} became {}", worst(&before), worst(&after));
+    assert!(texels.len() < 5 * first, "{} from {first}", texels.len());
+}

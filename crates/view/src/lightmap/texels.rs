@@ -114,7 +114,7 @@ fn enters(corners: &[DVec2; 3], c: DVec2, reach: DVec2) -> bool {
 }
 
 /// Distance to the triangle and the weights of its nearest point; works for triangles without area.
-fn nearest([a, b, c]: &[DVec2; 3], p: DVec2) -> (f64, [f64; 3]) {
+pub(super) fn nearest([a, b, c]: &[DVec2; 3], p: DVec2) -> (f64, [f64; 3]) {
     let area = (b - a).perp_dot(c - a);
     let weights = [(b - p).perp_dot(c - p), (c - p).perp_dot(a - p), (a - p).perp_dot(b - p)].map(|w| w / area);
     if area != 0.0 && weights.iter().all(|&w| (0.0..=1.0).contains(&w)) {
@@ -138,7 +138,7 @@ fn nearest([a, b, c]: &[DVec2; 3], p: DVec2) -> (f64, [f64; 3]) {
 }
 
 /// Moves a point that lies (almost) on a side towards the centroid by [`INSET`] texels, at most half the way.
-fn drawn_in(corners: &[DVec2; 3], weights: [f64; 3]) -> [f64; 3] {
+pub(super) fn drawn_in(corners: &[DVec2; 3], weights: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = *corners;
     let doubled = (b - a).perp_dot(c - a).abs();
     let on_side = [(b, c), (c, a), (a, b)]

@@ -1,0 +1,98 @@
+//! Numbers as people write them on a command line.
+
+use radiosity::Up;
+
+/// A length of one unit, in metres.
+pub fn unit(text: &str) -> Result<f64, String> {
+    match text {
+        "m" => Ok(1.0),
+        "cm" => Ok(0.01),
+        "mm" => Ok(0.001),
+        "in" => Ok(0.0254),
+        "ft" => Ok(0.3048),
+        number => positive(number).map_err(|_| "use m, cm, mm, in, ft or a number of metres".to_owned()),
+    }
+}
+
+/// The zenith's axis.
+pub fn up(text: &str) -> Result<Up, String> {
+    match text.to_ascii_lowercase().as_str() {
+        "y" => Ok(Up::Y),
+        "z" => Ok(Up::Z),
+        _ => Err("use y or z".to_owned()),
+    }
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    text.parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0).ok_or_else(|| "use a number above 0".to_owned())
+}
+
+/// Texels per metre, within what a layout can hold.
+pub fn density(text: &str) -> Result<f64, String> {
+    positive(text).ok().filter(|x| *x <= 1e6).ok_or_else(|| "use a number above 0 and up to 1000000".to_owned())
+}
+
+/// A relative error. A bare 1 is refused, as it may mean 1 % or all of it.
+pub fn error(text: &str) -> Result<f64, String> {
+    let value = match text.strip_suffix('%') {
+        // By its text: 0.7 % is 0.007, not 0.006999999999999999.
+        Some(number) => positive(&format!("{}e-2", number.trim_end())),
+        None => positive(text).and_then(|x| if x < 1.0 { Ok(x) } else { Err(String::new()) }),
+    };
+    value.ok().filter(|x| (1e-4..=1.0).contains(x)).ok_or_else(|| {
+        "use a percentage from 0.01% to 100%, such as 1%, or a fraction below 1, such as 0.01".to_owned()
+    })
+}
+
+/// A size in bytes.
+pub fn bytes(text: &str) -> Result<usize, String> {
+    let wrong = || "use a size such as 500M or 4G".to_owned();
+    let upper = text.to_ascii_uppercase();
+    let short = upper.strip_suffix('B').unwrap_or(&upper);
+    let short = short.strip_suffix('I').unwrap_or(short);
+    let scales = [('K', 1u64 << 10), ('M', 1 << 20), ('G', 1 << 30), ('T', 1 << 40)];
+    let scaled = scales.iter().find_map(|(letter, scale)| Some((short.strip_suffix(*letter)?, *scale)));
+    let (number, scale) = scaled.unwrap_or((short, 1));
+    let value = positive(number).map_err(|_| wrong())? * scale as f64;
+    if (1.0..=1e15).contains(&value) { Ok(value as usize) } else { Err(wrong()) }
+}
+
+/// Size of a picture, WIDTHxHEIGHT.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || "use WIDTHxHEIGHT, e.g. 1280x720, each from 1 to 16384".to_owned();
+    let (w, h) = text.split_once('x').ok_or_else(wrong)?;
+    let side = |t: &str| t.parse::<u32>().ok().filter(|n| (1..=16384).contains(n)).ok_or_else(wrong);
+    Ok((side(w)?, side(h)?))
+}
+
+/// An exposure in EV; ±60 spans everything between starlight and the sun's disc several times.
+pub fn exposure(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|x| (-60.0..=60.0).contains(x));
+    value.ok_or_else(|| "use a number from -60 to 60".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_as_people_write_them() {
+        assert_eq!([error("1%"), error("1 %"), error("0.02")], [Ok(0.01), Ok(0.01), Ok(0.02)]);
+        assert_eq!([error("100%"), error("0.7%")], [Ok(1.0), Ok(0.007)]);
+        for wrong in ["0", "1", "5", "nan", "-1%", "200%", "%", "0.001%", "one"] {
+            assert!(error(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(
+            [bytes("500M"), bytes("4G"), bytes("4GB"), bytes("4gib")],
+            [500 << 20, 4 << 30, 4 << 30, 4 << 30].map(Ok)
+        );
+        assert!(bytes("lots").is_err() && bytes("-1G").is_err() && bytes("").is_err());
+        assert_eq!(size("1280x720"), Ok((1280, 720)));
+        assert!(size("0x5").is_err() && size("5").is_err());
+        assert_eq!(unit("mm"), Ok(0.001));
+        assert!(unit("0").is_err());
+        assert!(density("1e6").is_ok() && density("1e10").is_err() && density("inf").is_err());
+        assert!(exposure("-7.5").is_ok() && exposure("nan").is_err() && exposure("1e300").is_err());
+    }
+}

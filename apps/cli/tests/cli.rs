@@ -1,0 +1,402 @@
+//! The program from outside: exit codes, streams, files, interrupts.
+
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+/// Options of a bake that takes a moment.
+const COARSE: [&str; 6] = ["--error", "20%", "--element-size", "0.15", "--size", "48x48"];
+
+/// A folder of a test's own, gone with it.
+struct Room(PathBuf);
+
+impl Room {
+    fn new(name: &str) -> Room {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).unwrap();
+        Room(path)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.0.join(name), text).unwrap();
+    }
+
+    fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.0.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    fn command<S: AsRef<OsStr>>(&self, arguments: impl IntoIterator<Item = S>) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_radiosity"));
+        command.current_dir(&self.0).args(arguments);
+        command
+    }
+
+    fn run<S: AsRef<OsStr>>(&self, arguments: impl IntoIterator<Item = S>) -> Run {
+        Run::of(self.command(arguments).output().unwrap())
+    }
+}
+
+impl Drop for Room {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What a run said.
+#[derive(Debug)]
+struct Run {
+    code: Option<i32>,
+    out: String,
+    err: String,
+}
+
+impl Run {
+    fn of(output: Output) -> Run {
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Run { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// Standard output as events: one object to a line, and nothing else.
+    fn events(&self) -> Vec<Value> {
+        let parse = |line: &str| -> Value { serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}")) };
+        let events: Vec<Value> = self.out.lines().map(parse).collect();
+        assert!(events.iter().all(|e| e["event"].is_string()), "{}", self.out);
+        assert!(self.out.is_empty() || self.out.ends_with('\n'));
+        events
+    }
+
+    /// The last event, which must be the result.
+    fn result(&self) -> Value {
+        assert_eq!((self.code, self.err.as_str()), (Some(0), ""), "{self:?}");
+        let mut events = self.events();
+        assert_eq!(events.iter().filter(|e| e["event"] == "result").count(), 1);
+        let last = events.pop().unwrap();
+        assert_eq!(last["event"], "result");
+        last
+    }
+}
+
+#[test]
+fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
+    let room = Room::new("wrong");
+    room.write("bad.obj", "v 0 0 0\nf 1 2 3\n");
+    room.write("bad.csv", "x,y,z\n1,2,3\n");
+    room.write("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for (call, said) in [
+        ("", "Usage"),
+        ("bakke", "similar subcommand exists: 'bake'"),
+        ("bake --eror 1%", "similar argument exists: '--error'"),
+        ("bake --error 1", "such as 1%"),
+        ("bake --error nan", "such as 1%"),
+        ("bake --error 0%", "such as 1%"),
+        ("bake --element-size 0", "above 0"),
+        ("bake --memory lots", "500M or 4G"),
+        ("bake --seed one", "invalid digit"),
+        ("bake --size 0x5", "1280x720"),
+        ("bake --exposure inf", "-60 to 60"),
+        ("bake --texels-per-metre 1e9", "up to 1000000"),
+        ("bake --max-atlas 3", "16..=16384"),
+        ("bake --vertices --unlit", "cannot be used with"),
+        ("bake --threads 0", "1..=1024"),
+        ("bake --up w", "y or z"),
+        ("bake --sky green", "uniform:L"),
+        ("bake --sky uniform:-1", "uniform:L"),
+        ("bake --sky hdr:none.hdr", "none.hdr: cannot be read"),
+        ("bake none.glb", "none.glb: cannot be read: No such file"),
+        ("bake bad.obj", "bad.obj"),
+        ("bake picture.stl", ".glb, .gltf or .obj"),
+        ("bake -o out.gltf", "must end in .glb"),
+        ("bake --report out.txt", "must end in .json or .html"),
+        ("bake --camera 7", "it has 0 'front'"),
+        ("bake --memory 1K", "use larger elements or allow more"),
+        ("bake one.obj -o lit.obj", "must end in .glb"),
+        ("render", "--output"),
+        ("render -o a.jpg", ".png or .exr"),
+        ("measure", "--points"),
+        ("measure --points none.csv", "none.csv: cannot be read"),
+        ("measure --points bad.csv", "no column nx, ny, nz"),
+        ("check none.obj", "none.obj: cannot be read"),
+    ] {
+        let run = room.run(call.split_whitespace());
+        assert_eq!(run.code, Some(2), "{call}: {run:?}");
+        assert!(run.err.contains(said), "{call}: {}", run.err);
+        assert!(run.out.is_empty() && !run.err.contains("panicked"), "{call}: {run:?}");
+        assert!(run.err.matches("error:").count() <= 1, "{call}: {}", run.err);
+    }
+    assert_eq!(room.names(), ["bad.csv", "bad.obj", "one.obj"], "nothing is left of a failed run");
+    for help in ["--help", "--version", "bake --help"] {
+        assert_eq!(room.run(help.split(' ')).code, Some(0));
+    }
+}
+
+#[test]
+fn outputs_that_cannot_be_written_are_refused_before_the_work() {
+    let room = Room::new("refused");
+    room.write("room.glb", "not read before");
+    room.write("file", "");
+    room.write("points.csv", "x,y,z,nx,ny,nz\n0.3,0,0.3,0,1,0\n");
+    fs::create_dir(room.0.join("folder.glb")).unwrap();
+    let before = room.names();
+    for (call, said) in [
+        ("bake -o nowhere/a.glb", "nowhere/a.glb: there is no folder nowhere; make it first"),
+        ("bake --report nowhere/a.html", "there is no folder nowhere"),
+        ("bake -o file/a.glb", "file"),
+        ("bake -o folder.glb", "is a folder"),
+        ("bake room.glb -o room.glb", "is read by this run"),
+        ("bake room.glb -o ./../refused/room.glb", "is read by this run"),
+        ("bake --report a.html --report ./a.html", "two outputs"),
+        ("bake -o a.glb --image a.lightmap0.exr", "two outputs"),
+        ("render -o nowhere/a.png", "there is no folder nowhere"),
+        ("measure --points points.csv -o points.csv", "is read by this run"),
+    ] {
+        let run = room.run(["--json"].into_iter().chain(call.split(' ')));
+        assert_eq!(run.code, Some(2), "{call}: {run:?}");
+        assert!(run.err.contains(said), "{call}: {}", run.err);
+        let events = run.events();
+        assert_eq!(events.len(), 1, "{call}: no stage has begun: {events:?}");
+        assert_eq!((&events[0]["event"], &events[0]["exit_code"]), (&"error".into(), &2.into()));
+        assert!(events[0]["message"].as_str().unwrap().contains(said));
+    }
+    assert_eq!(room.names(), before);
+}
+
+#[test]
+fn check_lists_what_is_there() {
+    let room = Room::new("check");
+    let cornell = room.run(["check", "--json"]).result();
+    assert_eq!((cornell["triangles"].as_u64(), cornell["objects"].as_u64()), (Some(38), Some(19)));
+    assert!((cornell["area"].as_f64().unwrap() - 1.9207).abs() < 1e-4);
+    assert_eq!(cornell["bounding_box"][0], serde_json::json!([0.0, 0.0, 0.0]));
+    assert_eq!(cornell["bounding_box"][1], serde_json::json!([0.556, 0.5488, 0.5592]));
+    let names: Vec<&str> = cornell["materials"].as_array().unwrap().iter().filter_map(|m| m["name"].as_str()).collect();
+    assert_eq!(names, ["white", "red", "green", "light"]);
+    assert_eq!((&cornell["lights"], &cornell["cameras"]), (&serde_json::json!([]), &serde_json::json!(["front"])));
+    assert_eq!(cornell["faults"][0]["severity"], "note");
+
+    room.write("lamp.gltf", LAMP);
+    let lamp = room.run(["check", "lamp.gltf", "--json"]).result();
+    assert_eq!((&lamp["lights"][0]["kind"], &lamp["lights"][0]["unit"]), (&"point".into(), &"cd".into()));
+    assert_eq!((&lamp["lights"][0]["name"], lamp["lights"][0]["position"][1].as_f64()), (&"bulb".into(), Some(2.0)));
+
+    // An input that cannot be used has its faults listed all the same.
+    room.write("bad.obj", "v 0 0 0\nf 1 2 3\n");
+    let bad = room.run(["check", "bad.obj", "--json"]);
+    let events = bad.events();
+    assert_eq!((bad.code, events.len()), (Some(2), 1), "{bad:?}");
+    let faults = events[0]["faults"].as_array().unwrap();
+    assert!(faults.iter().any(|f| f["severity"] == "error" && f["place"] == "bad.obj"), "{faults:?}");
+
+    let said = room.run(["check"]).out;
+    assert!(said.contains("38 triangles in 19 objects") && said.contains("4 materials"), "{said}");
+}
+
+/// A triangle under a point light.
+const LAMP: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+"extensionsUsed":["KHR_lights_punctual"],
+"extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","name":"bulb","intensity":100}]}},
+"nodes":[{"mesh":0},{"translation":[0,2,0],"extensions":{"KHR_lights_punctual":{"light":0}}}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAAAAAAAAAAAAAIA/AACAPwAAAAAAAAAA"}],
+"bufferViews":[{"buffer":0,"byteLength":36}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,0,1]}]}"#;
+
+#[test]
+fn bake_writes_model_picture_and_reports() {
+    let room = Room::new("bake");
+    let call = ["bake", "--json", "-o", "lit.glb", "--image", "lit.png", "--report", "r.json", "--report", "r.html"];
+    let run = room.run(call.iter().chain(&COARSE).chain(&["--texels-per-metre", "20", "--seed", "3"]));
+    let result = run.result();
+    let files = ["lit.glb", "lit.lightmap0.exr", "lit.png", "r.html", "r.json"];
+    assert_eq!(room.names(), files);
+    assert_eq!((&room.read("lit.glb")[..4], &room.read("lit.png")[1..4]), (&b"glTF"[..], &b"PNG"[..]));
+    assert_eq!(room.read("lit.lightmap0.exr")[..4], [0x76, 0x2f, 0x31, 0x01]);
+
+    let report: Value = serde_json::from_slice(&room.read("r.json")).unwrap();
+    assert_eq!(report, result["report"]);
+    assert_eq!((&report["program"], &report["version"]), (&"radiosity".into(), &env!("CARGO_PKG_VERSION").into()));
+    let command: Vec<&str> = report["command"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert_eq!((command[0], command[1], command.len()), ("radiosity", "bake", 1 + call.len() + COARSE.len() + 4));
+    let error = &report["error"];
+    assert_eq!((error["asked"].as_f64(), error["seed"].as_u64()), (Some(0.2), Some(3)));
+    let [lower, estimated, upper] =
+        ["lower_95_one_sided", "estimated", "upper_95_one_sided"].map(|name| error[name].as_f64().unwrap());
+    assert!(lower <= estimated && estimated <= upper && upper <= 0.2 && error["achieved"] == true, "{error}");
+    let defect = report["balance"]["defect"][1].as_f64().unwrap();
+    assert!(defect.abs() < 0.05, "{defect}");
+    let solution = &report["solution"];
+    assert!(solution["raw_closure"].as_f64().unwrap() < 1e-6);
+    assert!(solution["relative_residual"][0].as_f64().unwrap() <= 1e-5);
+    assert!(solution["guaranteed_bound"][0].as_f64().unwrap() > 0.0);
+    let stages = report["time"]["stages"].as_array().unwrap();
+    let (sum, whole) = (stages.iter().filter_map(|s| s["seconds"].as_f64()).sum::<f64>(), &report["time"]["seconds"]);
+    assert!(stages.iter().any(|s| s["name"] == "lightmap") && (sum / whole.as_f64().unwrap() - 1.0).abs() < 0.05);
+    assert!(cfg!(not(target_os = "linux")) || report["peak_memory_mb"].as_f64().unwrap() > 1.0);
+    assert!(report["about"]["error.upper_95_one_sided"].as_str().unwrap().contains("one-sided 95 % bound"));
+    let share: f64 =
+        report["illuminance"]["classes"].as_array().unwrap().iter().filter_map(|c| c["share"].as_f64()).sum();
+    assert!((share - 1.0).abs() < 1e-9, "{share}");
+
+    let page = String::from_utf8(room.read("r.html")).unwrap();
+    assert_eq!(page.matches("<img").count(), 2);
+    for said in ["error is reached", "radiosity bake --json -o lit.glb", "Energy balance", "Guaranteed bound"] {
+        assert!(page.contains(said), "{said}");
+    }
+    let program = Path::new(env!("CARGO_BIN_EXE_radiosity")).parent().unwrap().display().to_string();
+    assert!(!page.contains("://") && !page.contains(&program), "no address and no path of the program");
+}
+
+#[test]
+fn an_error_that_is_not_reached_is_said_plainly_and_is_no_failure() {
+    let room = Room::new("unreached");
+    let call = ["bake", "--error", "0.1%", "--rounds", "0", "--memory", "2M", "--element-size", "0.3", "--vertices"];
+    let run = room.run(call.iter().chain(&["-o", "a.glb", "--size", "32x32", "--report", "a.html"]));
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert!(run.err.contains("NOT reached"), "{}", run.err);
+    assert!(String::from_utf8(room.read("a.html")).unwrap().contains("The asked error is NOT reached"));
+    assert_eq!(room.names(), ["a.glb", "a.html"]);
+}
+
+#[test]
+fn measure_answers_on_standard_output_or_in_a_file() {
+    let room = Room::new("measure");
+    // The floor before the blocks.
+    let points: String = (0..100).map(|i| format!("0.{:02},0,0.0{},0,1,0\n", 5 + 4 * (i % 10), i / 20)).collect();
+    room.write("p.csv", &format!("x,y,z,nx,ny,nz\n{points}"));
+    let call = ["measure", "--points", "p.csv", "--error", "20%"];
+    let run = room.run(call);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let lines: Vec<&str> = run.out.lines().collect();
+    assert_eq!(lines[0], "x,y,z,nx,ny,nz,irradiance_r,irradiance_g,irradiance_b,illuminance_lux");
+    assert_eq!(lines.len(), 101);
+    let lux: Vec<f64> = lines[1..].iter().map(|l| l.rsplit(',').next().unwrap().parse().unwrap()).collect();
+    assert!(lux.iter().all(|e| (1.0..3000.0).contains(e)), "{lux:?}");
+    assert!(run.err.contains("reached") && run.err.contains("95 %"), "{}", run.err);
+
+    let run = room.run(call.iter().chain(&["-o", "e.csv", "-q"]));
+    assert_eq!((run.code, run.out.as_str(), run.err.as_str()), (Some(0), "", ""));
+    assert_eq!(String::from_utf8(room.read("e.csv")).unwrap().lines().collect::<Vec<_>>(), lines);
+
+    let result = room.run(call.iter().chain(&["--json"])).result();
+    assert_eq!(result["irradiance"].as_array().unwrap().len(), 100);
+    assert!(result["error"]["upper_95_one_sided"].as_f64().unwrap() <= 0.2);
+}
+
+#[test]
+fn a_picture_is_the_same_by_render_and_by_bake() {
+    let room = Room::new("render");
+    let run = room.run(["render", "--json", "-o", "a.png"].iter().chain(&COARSE));
+    assert_eq!(run.result()["width"].as_u64(), Some(48));
+    let bake = ["bake", "--vertices", "-o", "b.glb", "--image", "b.png"];
+    assert_eq!(room.run(bake.iter().chain(&COARSE)).code, Some(0));
+    assert!(room.read("a.png") == room.read("b.png"));
+    assert_eq!(room.run(["render", "-o", "a.exr"].iter().chain(&COARSE)).code, Some(0));
+    assert_eq!(room.read("a.exr")[..4], [0x76, 0x2f, 0x31, 0x01]);
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let room = Room::new("threads");
+    let ways: [&[&str]; 3] = [&["--texels-per-metre", "40"], &["--vertices"], &["--unlit"]];
+    for (way, options) in ways.iter().enumerate() {
+        let ending = if way == 1 { "exr" } else { "png" };
+        for threads in ["1", "2"] {
+            fs::create_dir(room.0.join(threads)).unwrap();
+            let (model, image) = (format!("{threads}/a.glb"), format!("{threads}/a.{ending}"));
+            let call = ["bake", "--threads", threads, "-o", &model, "--image", &image];
+            let run = room.run(call.iter().chain(&COARSE).chain(*options));
+            assert_eq!(run.code, Some(0), "{run:?}");
+        }
+        let mut names: Vec<_> =
+            fs::read_dir(room.0.join("1")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        let expected: &[&str] =
+            if way == 0 { &["a.glb", "a.lightmap0.exr", "a.png"] } else { &["a.glb", &format!("a.{ending}")] };
+        let mut expected = expected.to_vec();
+        expected.sort_unstable();
+        assert_eq!(names, expected);
+        for name in names {
+            assert!(room.read(&format!("1/{name}")) == room.read(&format!("2/{name}")), "{options:?} {name}");
+        }
+        for threads in ["1", "2"] {
+            fs::remove_dir_all(room.0.join(threads)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_run_that_fails_late_changes_no_file() {
+    let room = Room::new("late");
+    for name in ["a.glb", "a.lightmap0.exr", "a.png"] {
+        room.write(name, "precious");
+    }
+    let call = ["bake", "--json", "-o", "a.glb", "--image", "a.png", "--report", "a.json", "--texels-per-metre", "20"];
+    let mut child =
+        room.command(call.iter().chain(&COARSE)).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // The first line comes after the outputs were examined; then somebody takes the report's name.
+    let mut out = BufReader::new(child.stdout.take().unwrap());
+    out.read_line(&mut String::new()).unwrap();
+    fs::create_dir(room.0.join("a.json")).unwrap();
+    out.read_to_string(&mut String::new()).unwrap();
+    let run = Run::of(child.wait_with_output().unwrap());
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(run.err.contains("a.json"), "{}", run.err);
+    assert_eq!(room.names(), ["a.glb", "a.json", "a.lightmap0.exr", "a.png"]);
+    for name in ["a.glb", "a.lightmap0.exr", "a.png"] {
+        assert_eq!(room.read(name), b"precious", "{name}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_a_long_run_at_once_and_leaves_nothing() {
+    let room = Room::new("interrupt");
+    room.write("a.glb", "precious");
+    let call = ["bake", "--json", "-o", "a.glb", "--image", "a.png", "--error", "0.01%", "--rounds", "40"];
+    let mut child = room.command(call).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut out = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("\"rays\"") {
+        line.clear();
+        assert!(out.read_line(&mut line).unwrap() > 0, "the run ended by itself");
+    }
+    let sent = std::time::Instant::now();
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let mut rest = String::new();
+    out.read_to_string(&mut rest).unwrap();
+    let run = Run::of(child.wait_with_output().unwrap());
+    // A second leaves room for a busy machine; the rays of this run would take minutes.
+    assert!(sent.elapsed().as_secs_f64() < 3.0, "{:?}", sent.elapsed());
+    assert_eq!((run.code, run.err.as_str()), (Some(130), "interrupted\n"));
+    let last: Value = serde_json::from_str(rest.lines().last().unwrap()).unwrap();
+    assert_eq!((&last["event"], &last["exit_code"]), (&"error".into(), &130.into()));
+    assert_eq!(room.names(), ["a.glb"]);
+    assert_eq!(room.read("a.glb"), b"precious");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_answer_that_nobody_can_read_is_a_failure_and_no_panic() {
+    let room = Room::new("full");
+    for call in [&["check"][..], &["check", "--json"]] {
+        let full = fs::File::create("/dev/full").unwrap();
+        let run = Run::of(room.command(call).stdout(full).stderr(Stdio::piped()).output().unwrap());
+        assert_eq!(run.code, Some(1), "{run:?}");
+        assert!(run.err.starts_with("error: standard output") && run.err.lines().count() == 1, "{}", run.err);
+    }
+    // Progress that nobody reads does not cost the model.
+    let full = fs::File::create("/dev/full").unwrap();
+    let call = ["bake", "--json", "--vertices", "-o", "a.glb"];
+    let run = Run::of(room.command(call.iter().chain(&COARSE)).stdout(full).stderr(Stdio::piped()).output().unwrap());
+    assert_eq!((run.code, room.names()), (Some(1), vec!["a.glb".to_owned()]), "{run:?}");
+}

@@ -1,0 +1,511 @@
+//! Direct light at receivers: what each light would give unshadowed, times the share of it that is visible.
+//!
+//! What a light of few triangles gives unshadowed is known without sampling (Lambert's polygon factor). Shadow rays are
+//! dealt out to the lights in proportion to that, by systematic sampling, before any of them is traced: a pilot that
+//! stops where its rays agree takes half of every faint penumbra away (in a furnished office with twelve lights,
+//! pilots of 32 rays made 1.5 % of error where 1.0 % is left without). The visible share is Σ w V/Σ w over directions
+//! drawn nearly in proportion to their cosine, so that w, what is left over, hardly varies: points that see all of a
+//! light get its exact factor, and points near a large one, where area sampling goes wrong by factors, are as good
+//! as far ones.
+
+use crate::luminaires::{Light, Piece};
+use crate::polygon::{CosineTriangle, point_to_triangle};
+use crate::{Luminaires, Progress, Receivers, Stopped};
+use glam::{DVec2, DVec3};
+use radiosity_scene::elements::triangle_from_square;
+use radiosity_scene::{Bands, PointLight, luminance};
+use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
+use radiosity_trace::{Place, Tracer};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Lights with more triangles than this are sampled by power and area; evaluating the polygon factor of each would
+/// cost more than the shadow rays.
+const MOST_EXACT_PIECES: usize = 64;
+
+/// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
+/// much w varies. Fewer rays are averaged plainly, without any bias.
+const RATIO: u32 = 4;
+
+/// The streams of sample points that direct light uses: one for places, then one for each light.
+const DIRECT: u32 = 0x0300;
+
+/// How many shadow rays to spend.
+#[derive(Clone, Copy, Debug)]
+pub struct Shadowing {
+    /// Places on a receiver that has an area.
+    pub places: u32,
+    /// Shadow rays at each place, over all lights.
+    pub rays: u32,
+}
+
+/// Cosine rays at each place of a receiver that look how open it is. In a furnished office points are −1.33 % off
+/// without any, −0.50 % with one, −0.43 % with four.
+const OPEN: u32 = 2;
+
+/// The stream of sample points that these rays use.
+const OPENNESS: u32 = 0x02f0;
+
+/// Irradiance by receiver and light, lux per band.
+///
+/// An element has two means. The one over its area is its irradiance. The other is over what is *seen from afar*:
+/// places count by the share of their hemisphere in which nothing is near. Far receivers that look the element up see
+/// its open places only, and near ones do not look it up ([`crate::Gather`]); the mean over its area would give far
+/// ones too little, wherever an element reaches under furniture or into a shelf.
+#[derive(Clone, Debug, Default)]
+pub struct Columns {
+    lights: usize,
+    seen: Vec<Bands>,
+    mean: Vec<Bands>,
+}
+
+impl Columns {
+    /// What every light gives to what is seen of a receiver from afar.
+    pub fn seen_by_light(&self, receiver: usize) -> &[Bands] {
+        &self.seen[receiver * self.lights..][..self.lights]
+    }
+
+    /// What all lights give to what is seen of a receiver from afar.
+    pub fn seen(&self, receiver: usize) -> Bands {
+        add_up(self.seen_by_light(receiver))
+    }
+
+    /// What all lights give to a receiver.
+    pub fn mean(&self, receiver: usize) -> Bands {
+        self.mean[receiver]
+    }
+}
+
+fn add_up(values: &[Bands]) -> Bands {
+    values.iter().fold([0.0; 3], |sum, e| std::array::from_fn(|band| sum[band] + e[band]))
+}
+
+/// How direct illuminance is spread over a receiver.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Variation {
+    /// Mean, lx.
+    pub mean: f32,
+    /// Variance over places, lx².
+    pub variance: f32,
+}
+
+/// What the lights give unshadowed at one place, and the room to work it out.
+struct Unshadowed {
+    /// By light, lux per band.
+    irradiance: Vec<[f64; 3]>,
+    /// Its luminance, or something like it where it is not known without sampling.
+    weight: Vec<f64>,
+    /// By light and piece, luminance-weighted; lights of many pieces have none.
+    factors: Vec<f64>,
+    /// Shadow rays that each light has had at all places of the receiver.
+    used: Vec<u32>,
+    /// Result by light, lux per band.
+    visible: Vec<[f64; 3]>,
+}
+
+impl Luminaires {
+    /// Irradiance of every receiver from every light.
+    ///
+    /// # Errors
+    /// [`Stopped`] if `progress` says so.
+    pub fn columns(
+        &self,
+        tracer: &Tracer,
+        receivers: &impl Receivers,
+        shadowing: &Shadowing,
+        progress: &impl Progress,
+    ) -> Result<Columns, Stopped> {
+        let (n, lights) = (receivers.len(), self.lights.len());
+        let mut columns = Columns { lights, seen: vec![[0.0; 3]; n * lights], mean: vec![[0.0; 3]; n] };
+        if lights == 0 {
+            return Ok(columns);
+        }
+        const CHUNK: usize = 64;
+        let done = AtomicUsize::new(0);
+        let seen = columns.seen.par_chunks_mut(CHUNK * lights);
+        seen.zip(columns.mean.par_chunks_mut(CHUNK)).enumerate().try_for_each(|(chunk, (seen, mean))| {
+            let mut scratch = self.scratch();
+            let mut sums = vec![[0f64; 6]; lights];
+            for (k, (seen, mean)) in seen.chunks_exact_mut(lights).zip(mean.iter_mut()).enumerate() {
+                let i = chunk * CHUNK + k;
+                sums.fill([0.0; 6]);
+                let (mut places, mut open) = (0.0, 0.0);
+                self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |index, place, visible| {
+                    let openness = openness(tracer, receivers, i, index, place);
+                    places += 1.0;
+                    open += openness;
+                    for (sum, e) in sums.iter_mut().zip(visible) {
+                        for band in 0..3 {
+                            sum[band] += e[band];
+                            sum[band + 3] += openness * e[band];
+                        }
+                    }
+                });
+                for (seen, sum) in seen.iter_mut().zip(&sums) {
+                    for band in 0..3 {
+                        let over_area = sum[band] / f64::max(places, 1.0);
+                        mean[band] += over_area as f32;
+                        seen[band] = if open > 0.0 { sum[band + 3] / open } else { over_area } as f32;
+                    }
+                }
+            }
+            let so_far = done.fetch_add(mean.len(), Ordering::Relaxed) + mean.len();
+            progress.step(so_far, n).then_some(()).ok_or(Stopped)
+        })?;
+        Ok(columns)
+    }
+
+    /// Mean and variance of the direct illuminance over each receiver. The variance is that over places, without that
+    /// of the shadow rays, since it is the covariance of two independent estimates at the same places.
+    ///
+    /// # Errors
+    /// [`Stopped`] if `progress` says so.
+    pub fn variation(
+        &self,
+        tracer: &Tracer,
+        receivers: &impl Receivers,
+        shadowing: &Shadowing,
+        progress: &impl Progress,
+    ) -> Result<Vec<Variation>, Stopped> {
+        let n = receivers.len();
+        let mut variation = vec![Variation::default(); n];
+        if self.lights.is_empty() {
+            return Ok(variation);
+        }
+        const CHUNK: usize = 64;
+        let done = AtomicUsize::new(0);
+        variation.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, out)| {
+            let mut scratch = self.scratch();
+            for (k, out) in out.iter_mut().enumerate() {
+                let i = chunk * CHUNK + k;
+                let [first, second] = [1, 2].map(|set| {
+                    let mut at = vec![None; shadowing.places as usize];
+                    self.at_places(tracer, receivers, (i, set), shadowing, &mut scratch, |index, _, visible| {
+                        at[index as usize] = Some(visible.iter().map(|e| luminance_of(*e)).sum::<f64>());
+                    });
+                    at
+                });
+                let pairs: Vec<(f64, f64)> = first.into_iter().zip(second).filter_map(|(a, b)| a.zip(b)).collect();
+                if pairs.len() < 2 {
+                    continue;
+                }
+                let n = pairs.len() as f64;
+                let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+                let covariance: f64 = pairs.iter().map(|(x, y)| (x - a) * (y - b)).sum();
+                out.mean = (0.5 * (a + b)) as f32;
+                out.variance = (covariance / (n - 1.0)).max(0.0) as f32;
+            }
+            progress.step(done.fetch_add(out.len(), Ordering::Relaxed) + out.len(), n).then_some(()).ok_or(Stopped)
+        })?;
+        Ok(variation)
+    }
+
+    /// One unbiased sample of the irradiance of a place from one light.
+    pub(crate) fn sample(&self, light: usize, tracer: &Tracer, place: &Place, seed: u32) -> [f64; 3] {
+        let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
+        match &self.lights[light] {
+            Light::Point(light) => from_point(light, tracer, place, seed).0,
+            Light::Area { pieces, cumulative, .. } if pieces.len() > MOST_EXACT_PIECES => {
+                from_many((pieces, cumulative), tracer, place, (&sequence, 0, 1), seed).0
+            }
+            Light::Area { pieces, .. } => {
+                let mut factors = [0.0; MOST_EXACT_PIECES];
+                let here = unshadowed(pieces, place, &mut factors);
+                from_few((pieces, &factors), here, tracer, place, (&sequence, 0, 1), seed).0
+            }
+        }
+    }
+
+    fn scratch(&self) -> Unshadowed {
+        let lights = self.lights.len();
+        Unshadowed {
+            irradiance: vec![[0.0; 3]; lights],
+            weight: vec![0.0; lights],
+            factors: Vec::new(),
+            used: vec![0; lights],
+            visible: vec![[0.0; 3]; lights],
+        }
+    }
+
+    /// Calls back with each place of a receiver that is not buried, its number, and what each light gives there. The
+    /// sets 1 and 2 are independent shadow rays at the same places, other ones than those of set 0.
+    fn at_places(
+        &self,
+        tracer: &Tracer,
+        receivers: &impl Receivers,
+        (i, set): (usize, u32),
+        shadowing: &Shadowing,
+        scratch: &mut Unshadowed,
+        mut visit: impl FnMut(u32, &Place, &[[f64; 3]]),
+    ) {
+        let seed = receivers.seed(i);
+        let places = Sequence::new(if set == 0 { seed } else { hash(seed) }, DIRECT);
+        scratch.used.fill(0);
+        let Some(site) = receivers.site(i) else { return };
+        for index in 0..receivers.places(i, shadowing.places) {
+            let [offset, _, x, y] = places.point(index);
+            let place = site.place(x, y);
+            let seed = if set == 0 { seed } else { hash(seed ^ hash(set)) };
+            let stopped = self.at_place(tracer, &place, shadowing.rays, (f64::from(offset), seed, index), scratch);
+            // A place inside a solid is not a part of what is seen; one that is not has rays that get away.
+            if !(stopped && receivers.buried(tracer, &place, hash(seed ^ index))) {
+                visit(index, &place, &scratch.visible);
+            }
+        }
+    }
+
+    /// What each light gives at a place, into `scratch.visible`; whether any shadow ray was stopped.
+    fn at_place(
+        &self,
+        tracer: &Tracer,
+        place: &Place,
+        rays: u32,
+        (offset, seed, index): (f64, u32, u32),
+        scratch: &mut Unshadowed,
+    ) -> bool {
+        scratch.visible.fill([0.0; 3]);
+        scratch.factors.clear();
+        for (l, light) in self.lights.iter().enumerate() {
+            (scratch.irradiance[l], scratch.weight[l]) = match light {
+                Light::Point(light) => {
+                    let (direction, _, arriving) = light.arrival(place.point);
+                    let e = arriving.map(|e| f64::from(e) * direction.dot(place.normal).max(0.0));
+                    (e, luminance_of(e))
+                }
+                Light::Area { pieces, power, centre, radius, .. } if pieces.len() > MOST_EXACT_PIECES => {
+                    let away = *centre - place.point;
+                    let above = away.dot(place.normal) + radius > 0.0;
+                    let square = away.length_squared().max(radius * radius).max(f64::MIN_POSITIVE);
+                    ([0.0; 3], if above { power / (4.0 * PI * square) } else { 0.0 })
+                }
+                Light::Area { pieces, .. } => {
+                    let first = scratch.factors.len();
+                    scratch.factors.resize(first + pieces.len(), 0.0);
+                    let e = unshadowed(pieces, place, &mut scratch.factors[first..]);
+                    (e, luminance_of(e))
+                }
+            };
+        }
+        let total: f64 = scratch.weight.iter().sum();
+        if total <= 0.0 {
+            return false;
+        }
+
+        // Deal the rays out: light l gets ⌊n_l⌋ or ⌈n_l⌉ of them, n_l = rays · w_l/Σw, and n_l on average.
+        let (mut reached, mut first, mut any_stopped) = (offset, 0, false);
+        for (l, light) in self.lights.iter().enumerate() {
+            let exact = match light {
+                Light::Area { pieces, .. } if pieces.len() <= MOST_EXACT_PIECES => pieces.len(),
+                _ => 0,
+            };
+            let factors = &scratch.factors[first..first + exact];
+            first += exact;
+            let expected = f64::from(rays) * scratch.weight[l] / total;
+            let before = reached.floor();
+            reached += expected;
+            let n = (reached.floor() - before) as u32;
+            if n == 0 {
+                continue;
+            }
+            let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), scratch.used[l], n);
+            scratch.used[l] += n;
+            let salt = hash(seed ^ hash(index ^ hash(l as u32)));
+            let (mut e, stopped) = match light {
+                Light::Point(light) => from_point(light, tracer, place, salt),
+                Light::Area { pieces, .. } if exact > 0 => {
+                    from_few((pieces, factors), scratch.irradiance[l], tracer, place, samples, salt)
+                }
+                Light::Area { pieces, cumulative, .. } => from_many((pieces, cumulative), tracer, place, samples, salt),
+            };
+            if expected < 1.0 {
+                // It came about with this probability.
+                e = e.map(|e| e / expected);
+            }
+            any_stopped |= stopped;
+            scratch.visible[l] = e;
+        }
+        any_stopped
+    }
+}
+
+/// Share of the hemisphere of a place of a receiver in which nothing is near, by [`OPEN`] rays.
+fn openness(tracer: &Tracer, receivers: &impl Receivers, i: usize, index: u32, place: &Place) -> f64 {
+    let Some(near) = receivers.near(i) else { return 1.0 };
+    let (frame, sequence) = (frame(place.normal), Sequence::new(receivers.seed(i), OPENNESS));
+    let open = (index * OPEN..(index + 1) * OPEN).filter(|&k| {
+        let [u, v, _, _] = sequence.point(k);
+        let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+        !tracer.blocked(&tracer.ray(place, direction, near), hash(k))
+    });
+    open.count() as f64 / f64::from(OPEN)
+}
+
+fn luminance_of(e: [f64; 3]) -> f64 {
+    f64::from(luminance(e.map(|e| e as f32)))
+}
+
+/// Irradiance of a place from a source without area; whether it is hidden.
+fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, salt: u32) -> ([f64; 3], bool) {
+    let (direction, distance, arriving) = light.arrival(place.point);
+    let cosine = direction.dot(place.normal);
+    if cosine <= 0.0 || luminance(arriving) <= 0.0 {
+        return ([0.0; 3], false);
+    }
+    let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
+    if length > 0.0 && tracer.blocked(&tracer.ray(place, direction, length), salt) {
+        return ([0.0; 3], true);
+    }
+    (arriving.map(|e| f64::from(e) * cosine), false)
+}
+
+/// Unshadowed irradiance of a place from a light of few triangles; `factors` gets the luminance of each one's part.
+fn unshadowed(pieces: &[Piece], place: &Place, factors: &mut [f64]) -> [f64; 3] {
+    let mut sum = [0f64; 3];
+    for (piece, out) in pieces.iter().zip(factors) {
+        *out = 0.0;
+        if piece.triangle != place.triangle {
+            let factor = point_to_triangle(place.point, place.normal, piece.corners);
+            (0..3).for_each(|band| sum[band] += factor * f64::from(piece.exitance[band]));
+            *out = factor * f64::from(luminance(piece.exitance));
+        }
+    }
+    sum
+}
+
+/// `n` samples from number `first` of a sequence on.
+type Samples<'s> = (&'s Sequence, u32, u32);
+
+/// Irradiance of a place from a light of few triangles: analytic value `here` times visible share; whether any ray was
+/// stopped.
+fn from_few(
+    (pieces, factors): (&[Piece], &[f64]),
+    here: [f64; 3],
+    tracer: &Tracer,
+    place: &Place,
+    (sequence, first, n): Samples,
+    salt: u32,
+) -> ([f64; 3], bool) {
+    let total: f64 = factors.iter().sum();
+    if total <= 0.0 {
+        return ([0.0; 3], false);
+    }
+    let (mut visible, mut sampled) = ([0f64; 3], [0f64; 3]);
+    let mut stopped = false;
+    for index in first..first + n {
+        let [u, v, _, _] = sequence.point(index);
+        // Pick a piece by its unshadowed contribution, stretching u, and a direction towards it.
+        let mut rest = f64::from(u) * total;
+        let mut k = 0;
+        while k + 1 < pieces.len() && (rest >= factors[k] || factors[k] <= 0.0) {
+            rest -= factors[k];
+            k += 1;
+        }
+        while factors[k] <= 0.0 && k > 0 {
+            k -= 1;
+            rest = factors[k];
+        }
+        let piece = &pieces[k];
+        let u = (rest / factors[k]).clamp(0.0, 1.0 - 1e-9);
+        let (target, weight) = sample_piece(piece, place, u, f64::from(v));
+        if weight <= 0.0 {
+            continue;
+        }
+        // The weight of this sample for a source of unit exitance, over the density of having taken it.
+        let weight = weight * total / factors[k];
+        let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
+        stopped |= hidden;
+        let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
+        for band in 0..3 {
+            sampled[band] += weight * f64::from(piece.exitance[band]);
+            if !hidden {
+                visible[band] += weight * f64::from(tint[band]);
+            }
+        }
+    }
+    let irradiance = std::array::from_fn(|band| {
+        if n < RATIO {
+            visible[band] / f64::from(n)
+        } else if sampled[band] > 0.0 {
+            here[band] * visible[band] / sampled[band]
+        } else {
+            0.0
+        }
+    });
+    (irradiance, stopped)
+}
+
+/// Irradiance of a place from a light of many triangles: picked by power, sampled by area.
+fn from_many(
+    (pieces, cumulative): (&[Piece], &[f64]),
+    tracer: &Tracer,
+    place: &Place,
+    (sequence, first, n): Samples,
+    salt: u32,
+) -> ([f64; 3], bool) {
+    let mut sum = [0f64; 3];
+    let mut stopped = false;
+    for index in first..first + n {
+        let [u, v, _, _] = sequence.point(index);
+        let u = f64::from(u);
+        let k = cumulative.partition_point(|c| *c <= u).min(pieces.len() - 1);
+        let below = if k == 0 { 0.0 } else { cumulative[k - 1] };
+        let share = cumulative[k] - below;
+        let piece = &pieces[k];
+        let (p, q) = triangle_from_square(((u - below) / share).clamp(0.0, 1.0 - 1e-9), f64::from(v));
+        let [a, b, c] = piece.corners;
+        let target = Place { point: a + p * (b - a) + q * (c - a), normal: piece.normal, triangle: piece.triangle };
+        let weight = geometry(place, &target) * piece.area / share;
+        if weight <= 0.0 {
+            continue;
+        }
+        if tracer.mutually_visible(place, &target, salt ^ hash(index)) {
+            let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
+            (0..3).for_each(|band| sum[band] += weight * f64::from(tint[band]));
+        } else {
+            stopped = true;
+        }
+    }
+    (sum.map(|s| s / f64::from(n)), stopped)
+}
+
+/// cos θ cos θ'/(π r²) of two places, 1/m².
+fn geometry(from: &Place, to: &Place) -> f64 {
+    let along = to.point - from.point;
+    let square = along.length_squared();
+    let cosines = along.dot(from.normal).max(0.0) * (-along.dot(to.normal)).max(0.0);
+    if square > 0.0 { cosines / (PI * square * square) } else { 0.0 }
+}
+
+/// A point of a piece and its weight: the form-factor density over the sampling density.
+fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
+    let [a, b, c] = piece.corners;
+    let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
+    // Far away the solid angle is too small for its own arithmetic, and area sampling is as good.
+    let distance = (a + b + c) / 3.0 - place.point;
+    if piece.area < 1e-3 * distance.length_squared() {
+        let (p, q) = triangle_from_square(x, y);
+        let target = seen(a + p * (b - a) + q * (c - a));
+        return (target, geometry(place, &target) * piece.area);
+    }
+    let Some(triangle) = CosineTriangle::new(place.point, place.normal, piece.corners) else {
+        return (seen(a), 0.0);
+    };
+    let (direction, weight) = triangle.direction(x, y);
+    let towards = -direction.dot(piece.normal);
+    if weight <= 0.0 || towards <= 0.0 {
+        return (seen(a), 0.0);
+    }
+    let reach = (place.point - a).dot(piece.normal) / towards;
+    (seen(place.point + reach * direction), weight)
+}
+
+/// Exitance of a piece at a point of it, where the emission is a picture.
+fn emission_at(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
+    let [a, b, c] = tracer.mesh.corners(piece.triangle as usize);
+    let normal = (b - a).cross(c - a);
+    let square = normal.length_squared();
+    let uv = DVec2::new((point - a).cross(c - a).dot(normal) / square, (b - a).cross(point - a).dot(normal) / square);
+    let at = tracer.mesh.surface(piece.triangle as usize, uv.clamp(DVec2::ZERO, DVec2::ONE));
+    tracer.scene.emitted_luminance(at).map(|l| l * std::f32::consts::PI)
+}
