@@ -14,8 +14,10 @@ use rayon::prelude::*;
 /// −0.52 % with 4, −0.42 % with 8, which takes half as long again.
 const PIECES: u32 = 4;
 
-/// Shadow rays that look for cells in which direct light varies.
-const LOOKING: Shadowing = Shadowing { places: 8, rays: 4 };
+/// Places in a cell that look how direct light varies, and shadow rays at each: one for each light up to this many.
+/// With one ray at each place and twelve lights, points in a furnished office are −0.30 % off instead of −0.22 %.
+const PLACES: u32 = 8;
+const RAYS: usize = 4;
 
 /// Optical properties by element.
 pub(crate) struct Optics {
@@ -51,7 +53,8 @@ pub(crate) fn divided(
     // Nothing is known yet of what is buried; such places drop out one by one.
     let exposure = Exposure::default();
     let receivers = ElementReceivers { mesh: tracer.mesh, elements: &cells, exposure: &exposure };
-    let direct = luminaires.variation(tracer, &receivers, &LOOKING, progress)?;
+    let looking = Shadowing { places: PLACES, rays: luminaires.lights.len().min(RAYS) as u32 };
+    let direct = luminaires.variation(tracer, &receivers, &looking, progress)?;
 
     let weight = |i: usize| area[i] * f64::from(luminance(reflectance[i]));
     let flux: f64 = (0..cells.len()).map(|i| weight(i) * f64::from(direct[i].mean)).sum();

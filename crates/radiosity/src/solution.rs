@@ -41,7 +41,7 @@ impl Default for SolveOptions {
             cells: 10_000,
             variation: 0.02,
             rays: 64,
-            shadowing: Shadowing { places: 8, rays: 8 },
+            shadowing: Shadowing { places: 8, rays: 2 },
             solver: Params { tolerance: 1e-5, max_steps: 500 },
             memory: 4 << 30,
         }
