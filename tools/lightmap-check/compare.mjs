@@ -1,6 +1,6 @@
 // Does a viewer show what was computed? Bakes scenes, reads the light back out of three.js at points of their surfaces
 // and compares it with `radiosity measure` at the same points:
-//   node compare.mjs [--style lightmap|vertices|unlit]... [--error 2%] [--points 2000] [--edges 500] [--seed 1]
+//   node compare.mjs [--style lightmap|vertices]... [--error 2%] [--points 2000] [--edges 500] [--seed 1]
 //     [--out out/lightmap-check] [--program target/release/radiosity] [--limit 2%] [--bake="OPTIONS"] [--chromium PATH] [SCENE]...
 // SCENE is what `radiosity bake` takes, options of the scene included, in quotes: "room.glb --sky overcast:10000"; an
 // empty one is the built-in Cornell box. Without any: the Cornell box and stage.mjs, both styles that carry irradiance.
@@ -8,8 +8,9 @@
 //
 // The measure is the relative L2 difference of illuminance, ‖shown − measured‖ / ‖measured‖, over points spread by area;
 // it contains the errors of bake and of measure (1 %) besides that of the file and the viewer. p99 is of |difference| /
-// max(measured, 5 % of the mean). Edge points lie within a texel of an edge or of another surface, where texels are too
-// wide to follow the light. "File" is ‖shown − texels‖ / ‖texels‖ with the unclipped texels of the EXR that bake writes
+// max(measured, 5 % of the mean). "Even" is the L2 difference without the points where the texels (or vertices) that are
+// read differ by more than a fifth: a shadow ends there, within a texel, and finer texels are all that helps. Edge
+// points lie within a texel of an edge or of another surface, where texels are too wide to follow the light. "File" is ‖shown − texels‖ / ‖texels‖ with the unclipped texels of the EXR that bake writes
 // beside a lightmap: what coding and viewer alone do, at all points; and its p99.
 // Exit code 1 if an L2 difference over area points exceeds --limit.
 import { spawnSync } from 'node:child_process';
@@ -70,14 +71,16 @@ function statistics(pairs) {
   };
 }
 
-/// Bilinear look-ups in the EXR pages beside a lit model: illuminance at points that `sample` found.
-async function texels(stem, points) {
+/// What a file holds at points that `sample` found: the illuminance looked up in the EXR pages beside it (NaN where there
+/// are none), and by what share the texels or vertices that are read differ.
+async function stored(stem, points) {
   const pages = new Map();
   const values = [];
+  const spread = (list) => 1 - Math.min(...list) / (Math.max(...list) || 1);
   for (const { triangle, weights } of points) {
-    const { uvs, pageName, pageSize } = triangle;
+    const { uvs, light, pageName, pageSize } = triangle;
     if (!uvs) {
-      values.push(NaN);
+      values.push([NaN, light ? spread(light.map(luminance)) : 0]);
       continue;
     }
     if (!pages.has(pageName)) {
@@ -97,7 +100,8 @@ async function texels(stem, points) {
     });
     // The loader's rows run from the bottom.
     const texel = (x, y) => luminance(page.data.subarray(((page.height - 1 - y) * page.width + x) * page.stride));
-    values.push(at[1].reduce((sum, [y, v]) => sum + at[0].reduce((row, [x, u]) => row + u * v * texel(x, y), 0), 0));
+    const read = at[1].flatMap(([y, v]) => at[0].map(([x, u]) => [texel(x, y), u * v])).filter(([, weight]) => weight > 1e-3);
+    values.push([read.reduce((sum, [e, weight]) => sum + weight * e, 0), spread(read.map(([e]) => e))]);
   }
   return values;
 }
@@ -107,11 +111,8 @@ async function compare(scene, style) {
   const name = `${basename(file ?? 'cornell-box').replace(/\.\w+$/, '')}-${style}`;
   const at = (ending) => resolve(values.out, name + ending);
   const input = [...(file ? [file] : []), ...options];
-  const how = { lightmap: [], vertices: ['--vertices'], unlit: ['--unlit'] }[style];
-  if (!how) throw new Error(`--style ${style}: use lightmap, vertices or unlit`);
-  // Colours end at 1 but are floats: this dark, nothing is cut and nothing is lost.
-  const exposure = style === 'unlit' ? -20 : 0;
-  if (style === 'unlit') how.push('--exposure', String(exposure));
+  const how = { lightmap: [], vertices: ['--vertices'] }[style];
+  if (!how) throw new Error(`--style ${style}: use lightmap or vertices`);
   const baked = radiosity('bake', ...input, '-o', at('.glb'), '--error', values.error, ...how, ...values.bake.split(/\s+/).filter(Boolean));
   const { points } = await sample(at('.glb'), Number(values.points), Number(values.edges), Number(values.seed));
   // Points of the file stand in glTF's axes; `measure` asks for those of the scene.
@@ -128,11 +129,11 @@ async function compare(scene, style) {
   } finally {
     await viewer.close();
   }
-  const stored = style === 'lightmap' ? await texels(at(''), points) : points.map(() => NaN);
+  const held = await stored(at(''), points);
   const pairs = points.map(({ kind, point, normal, texel }, i) => {
     const cells = rows[i].split(',').map(Number);
-    const light = shown[i].map((x) => x / 2 ** exposure);
-    return { kind, point, normal, texel, e: luminance(cells.slice(6, 9)), h: luminance(light), stored: stored[i] };
+    const [stored, spread] = held[i];
+    return { kind, point, normal, texel, e: luminance(cells.slice(6, 9)), h: luminance(shown[i]), stored, spread };
   });
   const missing = pairs.filter(({ h }) => Number.isNaN(h));
   const whole = pairs.filter((pair) => !missing.includes(pair));
@@ -140,22 +141,23 @@ async function compare(scene, style) {
     [...point.map((x) => x.toFixed(5)), ...normal.map((x) => x.toFixed(3)), kind, texel.toPrecision(3), e.toPrecision(5), h.toPrecision(5), stored.toPrecision(5), ((h - e) / e).toFixed(4)].join());
   await writeFile(at('.compared.csv'), ['x,y,z,nx,ny,nz,kind,texel,measured_lux,shown_lux,texels_lux,relative', ...text].join('\n') + '\n');
   const [area, edge] = ['area', 'edge'].map((kind) => statistics(whole.filter((pair) => pair.kind === kind)));
+  const even = statistics(whole.filter(({ kind, spread }) => kind === 'area' && spread < 0.2));
   const coding = statistics(whole.map(({ stored, h }) => ({ e: stored, h })));
-  return { name, baked, measured, area, edge, coding, missing: missing.length };
+  return { name, baked, measured, area, even, edge, coding, missing: missing.length };
 }
 
 const percent = (x) => (Number.isNaN(x) ? '-' : `${(100 * x).toFixed(2)} %`);
-console.log('| scene | audit of bake, of measure | points | L2 | p99 | bias | edge points | L2 | p99 | bias | file | p99 | not drawn |');
-console.log(`|${'---|'.repeat(13)}`);
+console.log('| scene | audit of bake, of measure | points | L2 | p99 | bias | even | edge points | L2 | p99 | bias | file | p99 | not drawn |');
+console.log(`|${'---|'.repeat(14)}`);
 let failed = false;
 for (const scene of positionals) {
   for (const style of values.style) {
     try {
-      const { name, baked, measured, area, edge, coding, missing } = await compare(scene, style);
+      const { name, baked, measured, area, even, edge, coding, missing } = await compare(scene, style);
       const wrong = !(area.l2 <= share(values.limit));
       failed ||= wrong;
       const cells = (of) => [of.count, percent(of.l2), percent(of.p99), percent(of.bias)];
-      console.log(`| ${[name + (wrong ? ' **over the limit**' : ''), `${baked}, ${measured}`, ...cells(area), ...cells(edge), percent(coding.l2), percent(coding.p99), missing].join(' | ')} |`);
+      console.log(`| ${[name + (wrong ? ' **over the limit**' : ''), `${baked}, ${measured}`, ...cells(area), percent(even.l2), ...cells(edge), percent(coding.l2), percent(coding.p99), missing].join(' | ')} |`);
     } catch (error) {
       failed = true;
       console.log(`| ${scene || 'cornell-box'}, ${style} | ${error.message} |`);

@@ -92,8 +92,6 @@ function addPrimitive(json, primitive, world, read, pages, triangles) {
   const set = lightmap && attributes[`TEXCOORD_${lightmap.texCoord ?? 1}`];
   const uvs = set === undefined ? null : read(set);
   const light = attributes._IRRADIANCE === undefined ? null : read(attributes._IRRADIANCE);
-  const unlit = material.extensions?.KHR_materials_unlit !== undefined;
-  const colors = unlit && attributes.COLOR_0 !== undefined ? read(attributes.COLOR_0) : null;
   const indices = primitive.indices === undefined ? positions.map((_, i) => i) : read(primitive.indices).flat();
   for (let i = 0; i + 2 < indices.length; i += 3) {
     let at = indices.slice(i, i + 3);
@@ -102,15 +100,14 @@ function addPrimitive(json, primitive, world, read, pages, triangles) {
     const corners = at.map((k) => positions[k]);
     const normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
     const area = 0.5 * length(normal);
-    // The unlit colours of a lamp are its emission and say nothing of the light on it.
-    if (!(area > 0) || (unlit && material.emissiveFactor?.some((x) => x > 0))) continue;
+    if (!(area > 0)) continue;
     triangles.push({
       corners,
       area,
       normal: unit(normal),
       normals: normals && at.map((k) => normals[k]),
       uvs: uvs && at.map((k) => uvs[k]),
-      light: (light ?? colors) && at.map((k) => (light ?? colors)[k]),
+      light: light && at.map((k) => light[k]),
       page: lightmap?.index,
       pageName: lightmap && json.textures[lightmap.index].name,
       pageSize: lightmap && pages[lightmap.index],

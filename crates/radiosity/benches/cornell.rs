@@ -3,7 +3,7 @@
 //! Both answer the same question, the irradiance at the centres of some 10,000 elements, and are judged by the same
 //! norm, the area-weighted relative L2 error of its luminance. The path tracer is the referee as audits use it, its
 //! first bounce stratified. The engine is what `bake` runs: elements, exposure, direct light, rows, solver,
-//! continuous field, and direct light once more at the centres. It doubles M, the rays per element, and sends M/2 shadow
+//! continuous field, and direct light once more at the centres. It doubles M, the rays per element, and sends M shadow
 //! rays from each centre. The mesh and the tree of boxes are made beforehand for both. Nothing is
 //! denoised; the field averages neighbouring elements, which is part of the method, and so is its error in the result.
 //!
@@ -123,7 +123,7 @@ fn main() {
     let engine = |rays: u32| {
         let options = SolveOptions { element_size: Some(ELEMENT_SIZE), rays: rays as usize, ..SolveOptions::default() };
         let solution = Solution::new(&tracer, &options, &()).expect("the box fits into memory and converges");
-        let (field, shadowing) = (solution.indirect_field(), Shadowing { places: 1, rays: rays / 2 });
+        let (field, shadowing) = (solution.indirect_field(), Shadowing { places: 1, rays });
         let answer = solution.at(&exam.stations, Indirect::Field(&field), &shadowing, &());
         answer.expect("nobody stops it").irradiance
     };

@@ -90,9 +90,9 @@ impl Solution<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Answer, Error> {
         let direct = self.direct_at(places, shadowing, monitor)?;
-        let halves = self
-            .stages
-            .time(monitor, "gather", || self.gather().irradiance(&PointReceivers { places }, rays, &Watch(monitor)))?;
+        let halves = self.stages.time(monitor, "gather", || {
+            self.gather().irradiance(&PointReceivers { places, shaded: &[] }, rays, &Watch(monitor))
+        })?;
         let mut answer = Answer { direct, ..Answer::default() };
         for ([a, b], d) in halves.iter().zip(&answer.direct) {
             answer.irradiance.push(std::array::from_fn(|k| d[k] + 0.5 * (a[k] + b[k])));
@@ -111,10 +111,27 @@ impl Solution<'_> {
         shadowing: &Shadowing,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
-        let receivers = PointReceivers { places };
+        let shaded: Vec<bool> = places.par_iter().map(|place| self.may_be_shaded(place)).collect();
+        let receivers = PointReceivers { places, shaded: &shaded };
         let columns = self.stages.time(monitor, "direct light", || {
             self.luminaires.columns(self.tracer(), &receivers, shadowing, &Watch(monitor))
         })?;
         Ok((0..places.len()).map(|i| columns.mean(i)).collect())
+    }
+
+    /// Whether any light may be hidden from a place: whether any shadow ray of its cell was stopped. Of places in the open
+    /// nothing is known.
+    fn may_be_shaded(&self, place: &Place) -> bool {
+        let mesh = self.tracer().mesh;
+        let triangle = place.triangle as usize;
+        if triangle >= mesh.triangles.len() {
+            return true;
+        }
+        let side = if mesh.normal(triangle).dot(place.normal) >= 0.0 { Side::Front } else { Side::Back };
+        let uv = mesh.barycentric(triangle, place.point).as_vec2();
+        self.elements.at(place.triangle, uv.x, uv.y, side).is_none_or(|element| {
+            let mut cell = self.elements.of_cell(self.elements.cell(element));
+            cell.any(|e| self.columns.is_shaded(e as usize))
+        })
     }
 }

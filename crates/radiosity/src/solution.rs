@@ -39,7 +39,7 @@ impl Default for SolveOptions {
         SolveOptions {
             element_size: None,
             cells: 10_000,
-            variation: 0.02,
+            variation: 0.05,
             rays: 64,
             shadowing: Shadowing { places: 8, rays: 2 },
             solver: Params { tolerance: 1e-5, max_steps: 500 },
@@ -185,10 +185,10 @@ impl<'a> Solution<'a> {
     /// # Errors
     /// As [`Solution::new`].
     pub fn refine(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
-        let needed = HitTable::bytes(self.elements.len(), rays);
+        let needed = HitTable::bytes(self.elements.cells(), rays);
         if needed > self.options.memory {
             return Err(Error::Memory {
-                elements: self.elements.len(),
+                elements: self.elements.cells(),
                 rays,
                 needed: needed.div_ceil(1 << 20),
                 allowed: self.options.memory.div_ceil(1 << 20),

@@ -148,17 +148,21 @@ impl Elements {
         (t, if back { Side::Back } else { Side::Front })
     }
 
+    /// Barycentric corners of a cell.
+    pub fn cell_corners(&self, cell: usize) -> [DVec2; 3] {
+        let (t, side) = self.place(self.first[cell]);
+        corners(cell as u32 - self.base[t][side as usize], self.division[t])
+    }
+
     /// Barycentric corners of an element.
     pub fn corners(&self, element: ElementId) -> [DVec2; 3] {
-        let (t, side) = self.place(element);
-        let cell = self.cell[element as usize];
-        let first = self.first[cell as usize];
-        let pieces = self.first[cell as usize + 1] - first;
-        let [a, b, c] = corners(cell - self.base[t][side as usize], self.division[t]);
-        if pieces == 1 {
+        let cell = self.cell(element);
+        let [a, b, c] = self.cell_corners(cell);
+        let Range { start, end } = self.of_cell(cell);
+        if end - start == 1 {
             return [a, b, c];
         }
-        corners(element - first, pieces.isqrt()).map(|p| a + p.x * (b - a) + p.y * (c - a))
+        corners(element - start, (end - start).isqrt()).map(|p| a + p.x * (b - a) + p.y * (c - a))
     }
 
     /// Barycentric coordinates of the point of an element that (x, y) in the unit square maps to, area-uniform.

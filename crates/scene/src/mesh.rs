@@ -98,6 +98,14 @@ impl Mesh {
         a + uv.x * (b - a) + uv.y * (c - a)
     }
 
+    /// Barycentric coordinates (weights of corners 1, 2) of the foot of a point on a triangle's plane.
+    pub fn barycentric(&self, triangle: usize, point: DVec3) -> DVec2 {
+        let [a, b, c] = self.corners(triangle);
+        let normal = (b - a).cross(c - a);
+        let (from, square) = (point - a, normal.length_squared());
+        DVec2::new(from.cross(c - a).dot(normal), (b - a).cross(from).dot(normal)) / square
+    }
+
     /// The same point on the scene's own triangle, where pictures and colours are looked up.
     pub fn surface(&self, triangle: usize, uv: DVec2) -> Surface {
         let [a, b, c] = *self.split.get(triangle).unwrap_or(&WHOLE);

@@ -14,10 +14,11 @@ use crate::{Luminaires, Progress, Receivers, Stopped};
 use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Bands, PointLight, luminance};
-use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
+use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Place, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Lights with more triangles than this are sampled by power and area; evaluating the polygon factor of each would
@@ -58,6 +59,7 @@ pub struct Columns {
     lights: usize,
     seen: Vec<Bands>,
     mean: Vec<Bands>,
+    shaded: Vec<bool>,
 }
 
 impl Columns {
@@ -74,6 +76,12 @@ impl Columns {
     /// What all lights give to a receiver.
     pub fn mean(&self, receiver: usize) -> Bands {
         self.mean[receiver]
+    }
+
+    /// Whether any shadow ray of a receiver was stopped. Where all were, a sliver of light may still come in, and is then
+    /// all there is.
+    pub fn is_shaded(&self, receiver: usize) -> bool {
+        self.shaded[receiver]
     }
 }
 
@@ -102,7 +110,14 @@ struct Unshadowed {
     used: Vec<u32>,
     /// Result by light, lux per band.
     visible: Vec<[f64; 3]>,
+    /// What became of the shadow rays at all places of the receiver.
+    outcomes: u8,
 }
+
+/// A shadow ray came through.
+const LIT: u8 = 1;
+/// A shadow ray was stopped.
+const DARK: u8 = 2;
 
 impl Luminaires {
     /// Irradiance of every receiver from every light.
@@ -117,21 +132,23 @@ impl Luminaires {
         progress: &impl Progress,
     ) -> Result<Columns, Stopped> {
         let (n, lights) = (receivers.len(), self.lights.len());
-        let mut columns = Columns { lights, seen: vec![[0.0; 3]; n * lights], mean: vec![[0.0; 3]; n] };
+        let mut columns =
+            Columns { lights, seen: vec![[0.0; 3]; n * lights], mean: vec![[0.0; 3]; n], shaded: vec![false; n] };
         if lights == 0 {
             return Ok(columns);
         }
         const CHUNK: usize = 64;
         let done = AtomicUsize::new(0);
         let seen = columns.seen.par_chunks_mut(CHUNK * lights);
-        seen.zip(columns.mean.par_chunks_mut(CHUNK)).enumerate().try_for_each(|(chunk, (seen, mean))| {
+        let chunks = seen.zip(columns.mean.par_chunks_mut(CHUNK)).zip(columns.shaded.par_chunks_mut(CHUNK));
+        chunks.enumerate().try_for_each(|(chunk, ((seen, mean), shaded))| {
             let mut scratch = self.scratch();
             let mut sums = vec![[0f64; 6]; lights];
             for (k, (seen, mean)) in seen.chunks_exact_mut(lights).zip(mean.iter_mut()).enumerate() {
                 let i = chunk * CHUNK + k;
                 sums.fill([0.0; 6]);
                 let (mut places, mut open) = (0.0, 0.0);
-                self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |index, place, visible| {
+                self.at_places(tracer, receivers, (i, 0..1), shadowing, &mut scratch, |_, index, place, visible| {
                     let openness = openness(tracer, receivers, i, index, place);
                     places += 1.0;
                     open += openness;
@@ -142,6 +159,7 @@ impl Luminaires {
                         }
                     }
                 });
+                shaded[k] = scratch.outcomes != LIT;
                 for (seen, sum) in seen.iter_mut().zip(&sums) {
                     for band in 0..3 {
                         let over_area = sum[band] / f64::max(places, 1.0);
@@ -179,13 +197,11 @@ impl Luminaires {
             let mut scratch = self.scratch();
             for (k, out) in out.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
-                let [first, second] = [1, 2].map(|set| {
-                    let mut at = vec![None; shadowing.places as usize];
-                    self.at_places(tracer, receivers, (i, set), shadowing, &mut scratch, |index, _, visible| {
-                        at[index as usize] = Some(visible.iter().map(|e| luminance_of(*e)).sum::<f64>());
-                    });
-                    at
+                let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
+                self.at_places(tracer, receivers, (i, 1..3), shadowing, &mut scratch, |set, index, _, visible| {
+                    at[set as usize - 1][index as usize] = Some(visible.iter().map(|e| luminance_of(*e)).sum::<f64>());
                 });
+                let [first, second] = at;
                 let pairs: Vec<(f64, f64)> = first.into_iter().zip(second).filter_map(|(a, b)| a.zip(b)).collect();
                 if pairs.len() < 2 {
                     continue;
@@ -225,46 +241,49 @@ impl Luminaires {
             factors: Vec::new(),
             used: vec![0; lights],
             visible: vec![[0.0; 3]; lights],
+            outcomes: 0,
         }
     }
 
-    /// Calls back with each place of a receiver that is not buried, its number, and what each light gives there. The
-    /// sets 1 and 2 are independent shadow rays at the same places, other ones than those of set 0.
+    /// Calls back with the set, the number and the place for each place of a receiver that is not buried, and with what
+    /// each light gives there. The sets 1 and 2 are independent shadow rays at the same places, other ones than those of
+    /// set 0.
     fn at_places(
         &self,
         tracer: &Tracer,
         receivers: &impl Receivers,
-        (i, set): (usize, u32),
+        (i, sets): (usize, Range<u32>),
         shadowing: &Shadowing,
         scratch: &mut Unshadowed,
-        mut visit: impl FnMut(u32, &Place, &[[f64; 3]]),
+        mut visit: impl FnMut(u32, u32, &Place, &[[f64; 3]]),
     ) {
         let seed = receivers.seed(i);
-        let places = Sequence::new(if set == 0 { seed } else { hash(seed) }, DIRECT);
+        let places = Sequence::new(if sets.start == 0 { seed } else { hash(seed) }, DIRECT);
         scratch.used.fill(0);
+        scratch.outcomes = 0;
         let Some(site) = receivers.site(i) else { return };
+        let rays = receivers.rays(i, shadowing.rays);
         for index in 0..receivers.places(i, shadowing.places) {
             let [offset, _, x, y] = places.point(index);
             let place = site.place(x, y);
-            let seed = if set == 0 { seed } else { hash(seed ^ hash(set)) };
-            let stopped = self.at_place(tracer, &place, shadowing.rays, (f64::from(offset), seed, index), scratch);
-            // A place inside a solid is not a part of what is seen; one that is not has rays that get away.
-            if !(stopped && receivers.buried(tracer, &place, hash(seed ^ index))) {
-                visit(index, &place, &scratch.visible);
+            let total = self.unshadowed(&place, scratch);
+            for set in sets.clone() {
+                let (seed, offset) = match set {
+                    0 => (seed, offset),
+                    _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ index) ^ hash(set)))),
+                };
+                let outcome = self.shadow(tracer, &place, (rays, total), (f64::from(offset), seed, index), scratch);
+                scratch.outcomes |= outcome;
+                // A place inside a solid is not a part of what is seen; one that is not has rays that get away.
+                if outcome & DARK == 0 || !receivers.buried(tracer, &place, hash(seed ^ index)) {
+                    visit(set, index, &place, &scratch.visible);
+                }
             }
         }
     }
 
-    /// What each light gives at a place, into `scratch.visible`; whether any shadow ray was stopped.
-    fn at_place(
-        &self,
-        tracer: &Tracer,
-        place: &Place,
-        rays: u32,
-        (offset, seed, index): (f64, u32, u32),
-        scratch: &mut Unshadowed,
-    ) -> bool {
-        scratch.visible.fill([0.0; 3]);
+    /// What each light would give at a place; answers the sum of their weights.
+    fn unshadowed(&self, place: &Place, scratch: &mut Unshadowed) -> f64 {
         scratch.factors.clear();
         for (l, light) in self.lights.iter().enumerate() {
             (scratch.irradiance[l], scratch.weight[l]) = match light {
@@ -287,13 +306,25 @@ impl Luminaires {
                 }
             };
         }
-        let total: f64 = scratch.weight.iter().sum();
+        scratch.weight.iter().sum()
+    }
+
+    /// What each light gives at a place, into `scratch.visible`; what became of the shadow rays.
+    fn shadow(
+        &self,
+        tracer: &Tracer,
+        place: &Place,
+        (rays, total): (u32, f64),
+        (offset, seed, index): (f64, u32, u32),
+        scratch: &mut Unshadowed,
+    ) -> u8 {
+        scratch.visible.fill([0.0; 3]);
         if total <= 0.0 {
-            return false;
+            return 0;
         }
 
         // Deal the rays out: light l gets ⌊n_l⌋ or ⌈n_l⌉ of them, n_l = rays · w_l/Σw, and n_l on average.
-        let (mut reached, mut first, mut any_stopped) = (offset, 0, false);
+        let (mut reached, mut first, mut outcomes) = (offset, 0, 0);
         for (l, light) in self.lights.iter().enumerate() {
             let exact = match light {
                 Light::Area { pieces, .. } if pieces.len() <= MOST_EXACT_PIECES => pieces.len(),
@@ -311,7 +342,7 @@ impl Luminaires {
             let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), scratch.used[l], n);
             scratch.used[l] += n;
             let salt = hash(seed ^ hash(index ^ hash(l as u32)));
-            let (mut e, stopped) = match light {
+            let (mut e, outcome) = match light {
                 Light::Point(light) => from_point(light, tracer, place, salt),
                 Light::Area { pieces, .. } if exact > 0 => {
                     from_few((pieces, factors), scratch.irradiance[l], tracer, place, samples, salt)
@@ -322,10 +353,10 @@ impl Luminaires {
                 // It came about with this probability.
                 e = e.map(|e| e / expected);
             }
-            any_stopped |= stopped;
+            outcomes |= outcome;
             scratch.visible[l] = e;
         }
-        any_stopped
+        outcomes
     }
 }
 
@@ -345,18 +376,18 @@ fn luminance_of(e: [f64; 3]) -> f64 {
     f64::from(luminance(e.map(|e| e as f32)))
 }
 
-/// Irradiance of a place from a source without area; whether it is hidden.
-fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, salt: u32) -> ([f64; 3], bool) {
+/// Irradiance of a place from a source without area, and what became of the ray.
+fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, salt: u32) -> ([f64; 3], u8) {
     let (direction, distance, arriving) = light.arrival(place.point);
     let cosine = direction.dot(place.normal);
     if cosine <= 0.0 || luminance(arriving) <= 0.0 {
-        return ([0.0; 3], false);
+        return ([0.0; 3], 0);
     }
     let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
     if length > 0.0 && tracer.blocked(&tracer.ray(place, direction, length), salt) {
-        return ([0.0; 3], true);
+        return ([0.0; 3], DARK);
     }
-    (arriving.map(|e| f64::from(e) * cosine), false)
+    (arriving.map(|e| f64::from(e) * cosine), LIT)
 }
 
 /// Unshadowed irradiance of a place from a light of few triangles; `factors` gets the luminance of each one's part.
@@ -376,8 +407,8 @@ fn unshadowed(pieces: &[Piece], place: &Place, factors: &mut [f64]) -> [f64; 3] 
 /// `n` samples from number `first` of a sequence on.
 type Samples<'s> = (&'s Sequence, u32, u32);
 
-/// Irradiance of a place from a light of few triangles: analytic value `here` times visible share; whether any ray was
-/// stopped.
+/// Irradiance of a place from a light of few triangles: analytic value `here` times visible share; what became of
+/// the rays.
 fn from_few(
     (pieces, factors): (&[Piece], &[f64]),
     here: [f64; 3],
@@ -385,13 +416,13 @@ fn from_few(
     place: &Place,
     (sequence, first, n): Samples,
     salt: u32,
-) -> ([f64; 3], bool) {
+) -> ([f64; 3], u8) {
     let total: f64 = factors.iter().sum();
     if total <= 0.0 {
-        return ([0.0; 3], false);
+        return ([0.0; 3], 0);
     }
     let (mut visible, mut sampled) = ([0f64; 3], [0f64; 3]);
-    let mut stopped = false;
+    let mut outcome = 0;
     for index in first..first + n {
         let [u, v, _, _] = sequence.point(index);
         // Pick a piece by its unshadowed contribution, stretching u, and a direction towards it.
@@ -414,7 +445,7 @@ fn from_few(
         // The weight of this sample for a source of unit exitance, over the density of having taken it.
         let weight = weight * total / factors[k];
         let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
-        stopped |= hidden;
+        outcome |= if hidden { DARK } else { LIT };
         let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
         for band in 0..3 {
             sampled[band] += weight * f64::from(piece.exitance[band]);
@@ -432,7 +463,7 @@ fn from_few(
             0.0
         }
     });
-    (irradiance, stopped)
+    (irradiance, outcome)
 }
 
 /// Irradiance of a place from a light of many triangles: picked by power, sampled by area.
@@ -442,9 +473,9 @@ fn from_many(
     place: &Place,
     (sequence, first, n): Samples,
     salt: u32,
-) -> ([f64; 3], bool) {
+) -> ([f64; 3], u8) {
     let mut sum = [0f64; 3];
-    let mut stopped = false;
+    let mut outcome = 0;
     for index in first..first + n {
         let [u, v, _, _] = sequence.point(index);
         let u = f64::from(u);
@@ -462,11 +493,12 @@ fn from_many(
         if tracer.mutually_visible(place, &target, salt ^ hash(index)) {
             let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
             (0..3).for_each(|band| sum[band] += weight * f64::from(tint[band]));
+            outcome |= LIT;
         } else {
-            stopped = true;
+            outcome |= DARK;
         }
     }
-    (sum.map(|s| s / f64::from(n)), stopped)
+    (sum.map(|s| s / f64::from(n)), outcome)
 }
 
 /// cos θ cos θ'/(π r²) of two places, 1/m².
@@ -502,10 +534,7 @@ fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
 
 /// Exitance of a piece at a point of it, where the emission is a picture.
 fn emission_at(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
-    let [a, b, c] = tracer.mesh.corners(piece.triangle as usize);
-    let normal = (b - a).cross(c - a);
-    let square = normal.length_squared();
-    let uv = DVec2::new((point - a).cross(c - a).dot(normal) / square, (b - a).cross(point - a).dot(normal) / square);
-    let at = tracer.mesh.surface(piece.triangle as usize, uv.clamp(DVec2::ZERO, DVec2::ONE));
+    let uv = tracer.mesh.barycentric(piece.triangle as usize, point).clamp(DVec2::ZERO, DVec2::ONE);
+    let at = tracer.mesh.surface(piece.triangle as usize, uv);
     tracer.scene.emitted_luminance(at).map(|l| l * std::f32::consts::PI)
 }

@@ -12,11 +12,15 @@ use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use crate::receivers::Site;
 use crate::{Progress, Stopped};
 
-/// Rays of the pilot per element. A strip of 1/16 of an element that is buried may go unnoticed, and then darkens
-/// the element by as much.
-const PILOT: u32 = 16;
+/// Rays of the pilot per cell. A strip of an eighth of a cell may go unnoticed; places in it are then rejected one by
+/// one, as their rays meet backs.
+const PILOT: u32 = 8;
+
+/// The stream of sample points that exposure uses.
+const EXPOSURE: u32 = 0x0e59;
 
 /// Rays that examine one place.
 const PROBE: u32 = 8;
@@ -65,13 +69,12 @@ impl Exposure {
     ) -> Result<Exposure, Stopped> {
         const CHUNK: usize = 1024;
         let done = std::sync::atomic::AtomicUsize::new(0);
-        let n = elements.len();
+        let n = elements.cells();
         let chunks: Vec<Vec<(u32, u64)>> = (0..n.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(n);
-                let masks = range.clone().filter_map(|i| examine(tracer, mesh, elements, i as u32));
-                let masks: Vec<_> = masks.collect();
+                let masks: Vec<_> = range.clone().flat_map(|cell| examine_cell(tracer, mesh, elements, cell)).collect();
                 let so_far = done.fetch_add(range.len(), std::sync::atomic::Ordering::Relaxed) + range.len();
                 progress.step(so_far, n).then_some(masks).ok_or(Stopped)
             })
@@ -125,37 +128,42 @@ fn nth_bit(mut mask: u64, n: u32) -> u32 {
     mask.trailing_zeros()
 }
 
-/// The mask of an element, if it is not wholly exposed.
-fn examine(tracer: &Tracer, mesh: &Mesh, elements: &Elements, element: u32) -> Option<(u32, u64)> {
-    let (triangle, _) = elements.place(element);
-    let normal = elements.normal(mesh, element);
-    let frame = frame(normal);
-    let [a, b, c] = elements.corners(element).map(|uv| mesh.point(triangle, uv));
-    let at = |x: f64, y: f64| {
-        let (u, v) = radiosity_scene::elements::triangle_from_square(x, y);
-        a + u * (b - a) + v * (c - a)
-    };
-    let sequence = Sequence::new(element, 0x0e59);
-    let back = |x: f64, y: f64, u: f32, v: f32, seed: u32| {
-        let place = Place { point: at(x, y), normal, triangle: triangle as u32 };
+/// Whether a site may be buried in part: whether any of a few rays from it meets a back.
+fn is_suspect(tracer: &Tracer, site: &Site, sequence: &Sequence) -> bool {
+    let frame = frame(site.normal);
+    (0..PILOT).any(|i| {
+        let [u, v, x, y] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-        tracer.first(&tracer.ray(&place, direction, f64::INFINITY), seed) == Found::Back
-    };
-    let pilot = (0..PILOT)
-        .filter(|&i| {
-            let [u, v, x, y] = sequence.point(i);
-            back(f64::from(x), f64::from(y), u, v, i)
-        })
-        .count();
-    if pilot == 0 {
-        return None;
-    }
-    let mut mask = 0u64;
-    for cell in 0..64 {
+        tracer.first(&tracer.ray(&site.place(x, y), direction, f64::INFINITY), i) == Found::Back
+    })
+}
+
+/// The mask of a suspect element.
+fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32) -> u64 {
+    (0..64).fold(0, |mask, cell| {
         let [dx, dy, _, _] = sequence.point(PILOT + cell);
-        let (x, y) = ((f64::from(cell % 8) + f64::from(dx)) / 8.0, (f64::from(cell / 8) + f64::from(dy)) / 8.0);
-        let place = Place { point: at(x, y), normal, triangle: triangle as u32 };
-        mask |= u64::from(!is_buried(tracer, &place, element ^ cell << 24)) << cell;
+        let place = site.place(((cell % 8) as f32 + dx) / 8.0, ((cell / 8) as f32 + dy) / 8.0);
+        mask | u64::from(!is_buried(tracer, &place, element ^ cell << 24)) << cell
+    })
+}
+
+/// The masks of the elements of a cell that are not wholly exposed.
+fn examine_cell(tracer: &Tracer, mesh: &Mesh, elements: &Elements, cell: usize) -> Vec<(u32, u64)> {
+    let ids = elements.of_cell(cell);
+    let whole = Site::new(mesh, elements, ids.start, elements.cell_corners(cell), u64::MAX);
+    let sequence = Sequence::new(ids.start, EXPOSURE);
+    if !is_suspect(tracer, &whole, &sequence) {
+        return Vec::new();
     }
-    (mask != u64::MAX).then_some((element, mask))
+    let divided = ids.len() > 1;
+    ids.filter_map(|element| {
+        let site = Site::new(mesh, elements, element, elements.corners(element), u64::MAX);
+        let sequence = Sequence::new(element, EXPOSURE);
+        if divided && !is_suspect(tracer, &site, &sequence) {
+            return None;
+        }
+        let mask = examine(tracer, &site, &sequence, element);
+        (mask != u64::MAX).then_some((element, mask))
+    })
+    .collect()
 }

@@ -3,13 +3,20 @@
 use crate::Exposure;
 use crate::exposure::{is_buried, open_place};
 use crate::gather::near;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Elements, Mesh};
 use radiosity_trace::{Place, Tracer};
 
 /// Places keep off the border of their element by about this many welding tolerances (millionths of the scene).
 const BORDER: f64 = 4.0;
+
+/// Points in full light get this part of the shadow rays. What these miss they miss at random, as the rays that said
+/// so were others.
+const IN_LIGHT: u32 = 8;
+
+/// But not fewer than this.
+const LEAST: u32 = 8;
 
 /// Where a receiver lies: all that its places need, worked out once.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +30,23 @@ pub struct Site {
 }
 
 impl Site {
+    /// A part of an element's triangle, on the element's side, by its barycentric corners.
+    pub(crate) fn new(mesh: &Mesh, elements: &Elements, element: u32, corners: [DVec2; 3], mask: u64) -> Site {
+        let (triangle, _) = elements.place(element);
+        let [a, b, c] = corners.map(|uv| mesh.point(triangle, uv));
+        // Away from the border by more than rounding moves a ray's origin: a place within a billionth of a wall's foot
+        // would let rays start inside the wall.
+        let width = (b - a).cross(c - a).length().sqrt();
+        let inset = (BORDER * mesh.tolerance / width).min(0.25);
+        Site {
+            origin: a + inset * ((a + b + c) / 3.0 - a),
+            edges: [b - a, c - a].map(|edge| (1.0 - inset) * edge),
+            normal: elements.normal(mesh, element),
+            triangle: triangle as u32,
+            mask,
+        }
+    }
+
     /// The place that (x, y) in the unit square maps to.
     #[inline]
     pub fn place(&self, x: f32, y: f32) -> Place {
@@ -50,6 +74,10 @@ pub trait Receivers: Sync {
     }
     /// How many places to look at where a whole cell would get `wanted`.
     fn places(&self, i: usize, wanted: u32) -> u32;
+    /// How many shadow rays to send from each place where a receiver of which nothing is known would get `wanted`.
+    fn rays(&self, _i: usize, wanted: u32) -> u32 {
+        wanted
+    }
     /// The distance up to which the receiver is not looked up as a whole, metres; `None` for points.
     fn near(&self, i: usize) -> Option<f64>;
     /// A number that fixes the receiver's random choices: the same for the same place whatever else is asked.
@@ -77,18 +105,7 @@ impl Receivers for ElementReceivers<'_> {
         if mask == 0 {
             return None;
         }
-        let (triangle, _) = self.elements.place(element);
-        let [a, b, c] = self.elements.corners(element).map(|uv| self.mesh.point(triangle, uv));
-        // Away from the border by more than rounding moves a ray's origin: a place within a billionth of a wall's foot
-        // would let rays start inside the wall.
-        let inset = (BORDER * self.mesh.tolerance / self.elements.area(self.mesh, element).sqrt()).min(0.25);
-        Some(Site {
-            origin: a + inset * ((a + b + c) / 3.0 - a),
-            edges: [b - a, c - a].map(|edge| (1.0 - inset) * edge),
-            normal: self.elements.normal(self.mesh, element),
-            triangle: triangle as u32,
-            mask,
-        })
+        Some(Site::new(self.mesh, self.elements, element, self.elements.corners(element), mask))
     }
 
     fn buried(&self, tracer: &Tracer, place: &Place, seed: u32) -> bool {
@@ -113,6 +130,8 @@ impl Receivers for ElementReceivers<'_> {
 pub struct PointReceivers<'a> {
     /// The places.
     pub places: &'a [Place],
+    /// Whether any light may be hidden from each, as shadow rays of its surroundings say; empty if nothing is known.
+    pub shaded: &'a [bool],
 }
 
 impl Receivers for PointReceivers<'_> {
@@ -128,6 +147,14 @@ impl Receivers for PointReceivers<'_> {
 
     fn places(&self, _i: usize, _wanted: u32) -> u32 {
         1
+    }
+
+    fn rays(&self, i: usize, wanted: u32) -> u32 {
+        if self.shaded.get(i).is_none_or(|shaded| *shaded) {
+            wanted
+        } else {
+            (wanted / IN_LIGHT).max(LEAST).min(wanted)
+        }
     }
 
     fn near(&self, _i: usize) -> Option<f64> {
