@@ -157,7 +157,8 @@ pub fn measure(
     }
 }
 
-/// Judges an answer, spending the referee's paths only while they can still decide.
+/// Judges an answer, spending the referee's paths while the target lies between the two bounds: taking an estimate for
+/// the truth would refine for the noise of the referee.
 pub(crate) fn certify(
     auditor: &mut Auditor,
     h: &[Bands],
@@ -173,7 +174,7 @@ pub(crate) fn certify(
         }
         loop {
             let audit = auditor.judge(h);
-            let open = audit.upper > target && audit.error <= target && 2 * auditor.paths() <= most_paths;
+            let open = audit.lower <= target && target < audit.upper && 2 * auditor.paths() <= most_paths;
             if !open {
                 return Ok(audit);
             }

@@ -6,11 +6,11 @@ use glam::{DVec2, DVec3};
 use radiosity_scene::Side;
 use radiosity_trace::sampling::{Sequence, hash, unit};
 use radiosity_trace::{Found, Place, Tracer};
-use radiosity_transport::exposure::open_place;
+use radiosity_transport::exposure::{is_buried, open_place};
 use radiosity_view::picture::shading_normal;
 
-/// `count` stations spread evenly over the exposed area, one in each of as many equal shares of it. They receive with
-/// the shading normal, as pictures and lightmaps do.
+/// `count` stations spread evenly over the exposed area, one in each of as many equal shares of it, less those that turn
+/// out to lie inside a solid. They receive with the shading normal, as pictures and lightmaps do.
 pub fn spread(solution: &Solution, count: usize, seed: u32) -> Vec<Station> {
     let weight = solution.exposed_area();
     let total: f64 = weight.iter().sum();
@@ -31,7 +31,11 @@ pub fn spread(solution: &Solution, count: usize, seed: u32) -> Vec<Station> {
         let (x, y) = open_place(mask, x, y);
         let (triangle, side) = solution.elements.place(element as u32);
         let uv = solution.elements.sample(element as u32, x, y);
-        stations.push(station(solution.tracer(), triangle, uv, side));
+        let station = station(solution.tracer(), triangle, uv, side);
+        // Nobody sees the light inside a solid, and nothing is written there.
+        if !is_buried(solution.tracer(), &station.place, hash(seed ^ i as u32)) {
+            stations.push(station);
+        }
     }
     stations
 }

@@ -108,6 +108,11 @@ impl<'a> Tracer<'a> {
         &self.tree
     }
 
+    /// Whether nothing is cut out or partly transparent.
+    pub fn is_opaque(&self) -> bool {
+        self.all_opaque
+    }
+
     /// The distance by which origins are moved off their surface, metres.
     pub fn offset(&self) -> f64 {
         self.offset

@@ -221,7 +221,7 @@ impl Luminaires {
     pub(crate) fn sample(&self, light: usize, tracer: &Tracer, place: &Place, seed: u32) -> [f64; 3] {
         let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
         match &self.lights[light] {
-            Light::Point(light) => from_point(light, tracer, place, seed).0,
+            Light::Point(light) => from_point(light, tracer, place, 1, seed).0,
             Light::Area { pieces, cumulative, .. } if pieces.len() > MOST_EXACT_PIECES => {
                 from_many((pieces, cumulative), tracer, place, (&sequence, 0, 1), seed).0
             }
@@ -323,7 +323,9 @@ impl Luminaires {
             return 0;
         }
 
-        // Deal the rays out: light l gets ⌊n_l⌋ or ⌈n_l⌉ of them, n_l = rays · w_l/Σw, and n_l on average.
+        // Deal the rays out: light l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average. Half of them go by what the lights
+        // would give and half to all alike, as a lamp that had a ray now and then would sparkle in sunlight.
+        let even = 0.5 * f64::from(rays) / scratch.weight.iter().filter(|w| **w > 0.0).count() as f64;
         let (mut reached, mut first, mut outcomes) = (offset, 0, 0);
         for (l, light) in self.lights.iter().enumerate() {
             let exact = match light {
@@ -332,7 +334,10 @@ impl Luminaires {
             };
             let factors = &scratch.factors[first..first + exact];
             first += exact;
-            let expected = f64::from(rays) * scratch.weight[l] / total;
+            if scratch.weight[l] <= 0.0 {
+                continue;
+            }
+            let expected = 0.5 * f64::from(rays) * scratch.weight[l] / total + even;
             let before = reached.floor();
             reached += expected;
             let n = (reached.floor() - before) as u32;
@@ -343,7 +348,7 @@ impl Luminaires {
             scratch.used[l] += n;
             let salt = hash(seed ^ hash(index ^ hash(l as u32)));
             let (mut e, outcome) = match light {
-                Light::Point(light) => from_point(light, tracer, place, salt),
+                Light::Point(light) => from_point(light, tracer, place, n, salt),
                 Light::Area { pieces, .. } if exact > 0 => {
                     from_few((pieces, factors), scratch.irradiance[l], tracer, place, samples, salt)
                 }
@@ -376,18 +381,20 @@ fn luminance_of(e: [f64; 3]) -> f64 {
     f64::from(luminance(e.map(|e| e as f32)))
 }
 
-/// Irradiance of a place from a source without area, and what became of the ray.
-fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, salt: u32) -> ([f64; 3], u8) {
+/// Irradiance of a place from a source without area, and what became of the rays. There is one line of sight: `n` rays
+/// go along it only where surfaces may be partly transparent, which each decides anew.
+fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, n: u32, salt: u32) -> ([f64; 3], u8) {
     let (direction, distance, arriving) = light.arrival(place.point);
     let cosine = direction.dot(place.normal);
     if cosine <= 0.0 || luminance(arriving) <= 0.0 {
         return ([0.0; 3], 0);
     }
     let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
-    if length > 0.0 && tracer.blocked(&tracer.ray(place, direction, length), salt) {
-        return ([0.0; 3], DARK);
-    }
-    (arriving.map(|e| f64::from(e) * cosine), LIT)
+    let ray = tracer.ray(place, direction, length);
+    let n = if tracer.is_opaque() { 1 } else { n };
+    let clear = (0..n).filter(|&i| length <= 0.0 || !tracer.blocked(&ray, salt ^ hash(i))).count();
+    let outcome = if clear > 0 { LIT } else { 0 } | if clear < n as usize { DARK } else { 0 };
+    (arriving.map(|e| f64::from(e) * cosine * clear as f64 / f64::from(n)), outcome)
 }
 
 /// Unshadowed irradiance of a place from a light of few triangles; `factors` gets the luminance of each one's part.
