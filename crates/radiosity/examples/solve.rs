@@ -25,6 +25,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (object, [lumens, square_metres]) in scene.objects.iter().zip(sums) {
         println!("{:20} {:9.1} lx", object.name, lumens / square_metres.max(f64::MIN_POSITIVE));
     }
-    println!("standard error of the rows' sampling: {:.2} %", 100.0 * solution.row_error());
+    println!("standard error of the rows' sampling: {:.2} %", 100.0 * solution.row_noise());
     Ok(())
 }

@@ -19,6 +19,9 @@ use std::collections::HashMap;
 /// of its own: it is the inside of a solid.
 const FORGOTTEN_SIDE: f64 = 1e-3;
 
+/// By how much the continuous field lessens the noise of cells: a corner is the mean of some six of them.
+const SMOOTHING: f64 = 2.4;
+
 /// How to bake.
 #[derive(Clone, Copy, Debug)]
 pub struct BakeOptions {
@@ -90,7 +93,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let achieved = audit.upper <= options.error;
         // More rounds only while there is something to gain and memory to gain it with.
         let smaller = solution.element_size / std::f64::consts::SQRT_2;
-        let noisy = solution.row_error() > 0.5 * audit.error.max(0.5 * options.error);
+        let noisy = solution.row_noise() / SMOOTHING > 0.5 * options.error;
         let next = SolveOptions {
             rays: if noisy { 2 * solution.rays() } else { solution.rays() },
             element_size: Some(if noisy { solution.element_size } else { smaller }),

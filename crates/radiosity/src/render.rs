@@ -17,13 +17,13 @@ pub struct RenderOptions {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Shadow rays per pixel and light.
+    /// Shadow rays per pixel, over all lights.
     pub shadowing: Shadowing,
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        RenderOptions { width: 1280, height: 720, shadowing: Shadowing { places: 1, rays: 64 } }
+        RenderOptions { width: 1280, height: 720, shadowing: Shadowing { places: 1, rays: 128 } }
     }
 }
 

@@ -545,3 +545,92 @@ fn emission_at(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
     let at = tracer.mesh.surface(piece.triangle as usize, uv);
     tracer.scene.emitted_luminance(at).map(|l| l * std::f32::consts::PI)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PointReceivers;
+    use radiosity_scene::{Elements, Material, Mesh, Scene};
+
+    /// A floor, and lamps of 0.2 m side in a row 2 m above it that face down, each half as bright as the one before.
+    fn lamps(count: u32, blocker: bool) -> Scene {
+        let mut scene = Scene::default();
+        let lamp = |l: f32| Material { emissive: [l; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
+        scene.materials.push(Material::default());
+        scene.materials.push(Material { double_sided: true, ..Material::default() });
+        scene.materials.extend((0..count).map(|i| lamp(1000.0 * 0.5f32.powi(i as i32))));
+        let quad = |low: DVec3, x: DVec3, y: DVec3| [low, low + x, low + x + y, low + y];
+        scene.add_quad("floor", 0, quad(DVec3::new(-3., -3., 0.), DVec3::X * 6.0, DVec3::Y * 6.0));
+        for i in 0..count {
+            let low = DVec3::new(0.3 * f64::from(i), 0.0, 2.0);
+            scene.add_quad("lamp", 2 + i as usize, quad(low, DVec3::Y * 0.2, DVec3::X * 0.2));
+        }
+        if blocker {
+            // Half way up: hides what lies beyond x = 0.1 from a point below that.
+            scene.add_quad("blocker", 1, quad(DVec3::new(0.1, -1.0, 1.0), DVec3::X * 2.0, DVec3::Y * 2.0));
+        }
+        scene
+    }
+
+    fn illuminance(scene: &Scene, places: &[Place], rays: u32) -> Vec<f64> {
+        let mesh = Mesh::new(scene);
+        let tracer = Tracer::new(scene, &mesh);
+        let elements = Elements::new(scene, &mesh, 10.0);
+        let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+        let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(scene, &mesh, e).1).collect();
+        let luminaires = Luminaires::new(scene, &mesh, &elements, &area, &exitance);
+        let receivers = PointReceivers { places, shaded: &[] };
+        let columns = luminaires.columns(&tracer, &receivers, &Shadowing { places: 1, rays }, &()).unwrap();
+        (0..places.len()).map(|i| f64::from(columns.mean(i)[1])).collect()
+    }
+
+    fn on_the_floor(x: f64, y: f64) -> Place {
+        Place { point: DVec3::new(x, y, 0.0), normal: DVec3::Z, triangle: u32::MAX }
+    }
+
+    /// What a lamp of luminance 1000 gives to a point of the floor, by Lambert's factor of the part from `from` to `to`.
+    fn exact(place: &Place, (from, to): (f64, f64)) -> f64 {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 2.0);
+        let corners = [p(from, 0.0), p(from, 0.2), p(to, 0.2), p(to, 0.0)];
+        let factor = point_to_triangle(place.point, place.normal, [corners[0], corners[1], corners[2]])
+            + point_to_triangle(place.point, place.normal, [corners[0], corners[2], corners[3]]);
+        1000.0 * PI * factor
+    }
+
+    /// In full light every lamp gives its exact factor, in whatever shares the rays are dealt out.
+    #[test]
+    fn full_light_is_exact() {
+        let places: Vec<Place> = (0..20).map(|i| on_the_floor(0.1 * f64::from(i) - 0.7, 0.05)).collect();
+        for (place, e) in places.iter().zip(illuminance(&lamps(6, false), &places, 64)) {
+            let truth: f64 = (0..6)
+                .map(|i| {
+                    let shifted = on_the_floor(place.point.x - 0.3 * f64::from(i), place.point.y);
+                    0.5f64.powi(i) * exact(&shifted, (0.0, 0.2))
+                })
+                .sum();
+            assert!((e - truth).abs() < 1e-5 * truth, "{e} for {truth}");
+        }
+    }
+
+    /// Few rays scatter about the truth and are not drawn to it from one side, in shadow, light and between; pilots that
+    /// stopped early were.
+    #[test]
+    fn penumbrae_are_unbiased() {
+        let scene = lamps(1, true);
+        for x in [-0.02, 0.002, 0.02, 0.07, 0.098] {
+            // From (x, 0) the blocker's edge at (0.1, 1) is seen against the lamp's plane at 0.2 − x.
+            let edge = (0.2f64 - x).clamp(0.0, 0.2);
+            let truth = exact(&on_the_floor(x, 0.1), (0.0, edge));
+            // Places a hair apart have independent rays.
+            let places: Vec<Place> = (0..4000).map(|i| on_the_floor(x, 0.1 + 1e-7 * f64::from(i))).collect();
+            for rays in [2, 8] {
+                let e = illuminance(&scene, &places, rays);
+                let mean = e.iter().sum::<f64>() / e.len() as f64;
+                let spread = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / e.len() as f64).sqrt();
+                let error = spread / (e.len() as f64).sqrt();
+                // Five standard errors: a false alarm once in two million.
+                assert!((mean - truth).abs() < 5.0 * error + 2e-3 * truth, "{x}, {rays}: {mean} for {truth} ± {error}");
+            }
+        }
+    }
+}
