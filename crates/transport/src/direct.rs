@@ -21,9 +21,15 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Lights with more triangles than this are sampled by power and area; evaluating the polygon factor of each would
-/// cost more than the shadow rays.
+/// Lights with more triangles than this are sampled by area; evaluating the polygon factor of each would cost more than
+/// the shadow rays.
 const MOST_EXACT_PIECES: usize = 64;
+
+/// Lights of up to this many triangles have them picked by about what they give, larger ones by their power alone.
+const MOST_WEIGHED_PIECES: usize = 4096;
+
+/// Added to the cosines by which pieces are picked: what faces away at its centre may still give a little.
+const GRAZING: f64 = 0.05;
 
 /// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
 /// much w varies. Fewer rays are averaged plainly, without any bias.
@@ -223,6 +229,7 @@ impl Luminaires {
         match &self.lights[light] {
             Light::Point(light) => from_point(light, tracer, place, 1, seed).0,
             Light::Area { pieces, cumulative, .. } if pieces.len() > MOST_EXACT_PIECES => {
+                // One sample does not pay for weighing the pieces.
                 from_many((pieces, cumulative), tracer, place, (&sequence, 0, 1), seed).0
             }
             Light::Area { pieces, .. } => {
@@ -292,6 +299,11 @@ impl Luminaires {
                     let e = arriving.map(|e| f64::from(e) * direction.dot(place.normal).max(0.0));
                     (e, luminance_of(e))
                 }
+                Light::Area { pieces, .. }
+                    if pieces.len() > MOST_EXACT_PIECES && pieces.len() <= MOST_WEIGHED_PIECES =>
+                {
+                    ([0.0; 3], weigh(pieces, place, &mut scratch.factors))
+                }
                 Light::Area { pieces, power, centre, radius, .. } if pieces.len() > MOST_EXACT_PIECES => {
                     let away = *centre - place.point;
                     let above = away.dot(place.normal) + radius > 0.0;
@@ -328,12 +340,12 @@ impl Luminaires {
         let even = 0.5 * f64::from(rays) / scratch.weight.iter().filter(|w| **w > 0.0).count() as f64;
         let (mut reached, mut first, mut outcomes) = (offset, 0, 0);
         for (l, light) in self.lights.iter().enumerate() {
-            let exact = match light {
-                Light::Area { pieces, .. } if pieces.len() <= MOST_EXACT_PIECES => pieces.len(),
+            let known = match light {
+                Light::Area { pieces, .. } if pieces.len() <= MOST_WEIGHED_PIECES => pieces.len(),
                 _ => 0,
             };
-            let factors = &scratch.factors[first..first + exact];
-            first += exact;
+            let factors = &scratch.factors[first..first + known];
+            first += known;
             if scratch.weight[l] <= 0.0 {
                 continue;
             }
@@ -349,9 +361,10 @@ impl Luminaires {
             let salt = hash(seed ^ hash(index ^ hash(l as u32)));
             let (mut e, outcome) = match light {
                 Light::Point(light) => from_point(light, tracer, place, n, salt),
-                Light::Area { pieces, .. } if exact > 0 => {
+                Light::Area { pieces, .. } if pieces.len() <= MOST_EXACT_PIECES => {
                     from_few((pieces, factors), scratch.irradiance[l], tracer, place, samples, salt)
                 }
+                Light::Area { pieces, .. } if known > 0 => from_many((pieces, factors), tracer, place, samples, salt),
                 Light::Area { pieces, cumulative, .. } => from_many((pieces, cumulative), tracer, place, samples, salt),
             };
             if expected < 1.0 {
@@ -473,7 +486,30 @@ fn from_few(
     (irradiance, outcome)
 }
 
-/// Irradiance of a place from a light of many triangles: picked by power, sampled by area.
+/// Appends the running sum of about what each piece gives to a place, ending at 1; answers the sum, lx.
+fn weigh(pieces: &[Piece], place: &Place, cumulative: &mut Vec<f64>) -> f64 {
+    let first = cumulative.len();
+    let mut sum = 0.0;
+    for piece in pieces {
+        let away = piece.corners.iter().sum::<DVec3>() / 3.0 - place.point;
+        let square = away.length_squared().max(piece.area);
+        let length = square.sqrt();
+        let cosines = [place.normal.dot(away), -piece.normal.dot(away)].map(|c| (c / length).max(0.0) + GRAZING);
+        let behind = (place.point - piece.corners[0]).dot(piece.normal) <= 0.0;
+        let below = piece.corners.iter().all(|c| (*c - place.point).dot(place.normal) <= 0.0);
+        if !behind && !below {
+            let shares = cosines[0] * cosines[1] / (PI * square);
+            sum += f64::from(luminance(piece.exitance)) * piece.area * shares;
+        }
+        cumulative.push(sum);
+    }
+    if sum > 0.0 {
+        cumulative[first..].iter_mut().for_each(|c| *c /= sum);
+    }
+    sum
+}
+
+/// Irradiance of a place from a light of many triangles: picked by the running sum of their shares, sampled by area.
 fn from_many(
     (pieces, cumulative): (&[Piece], &[f64]),
     tracer: &Tracer,
