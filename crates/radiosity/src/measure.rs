@@ -35,7 +35,7 @@ impl Default for MeasureOptions {
 }
 
 /// Cells to aim for where they are looked up by a gather at each point.
-const LOOKED_UP_CELLS: usize = 20_000;
+const LOOKED_UP_CELLS: usize = 30_000;
 
 /// Fewest pairs of estimates that an audit judges by.
 const LEAST_WATCHED: usize = 64;
@@ -101,8 +101,8 @@ pub fn measure(
     // The elements are only looked up, and the noise of many averages out: few rays each, and small ones.
     solve.rays = solve.rays.max(rays_for(options.error, 32.0, 16, 1024));
     solve.cells = solve.cells.max(LOOKED_UP_CELLS);
-    solve.variation = solve.variation.min(2.0 * options.error);
-    let mut gather = rays_for(options.error, 2048.0, 32, 16384);
+    solve.variation = solve.variation.min(options.error);
+    let mut gather = rays_for(options.error, 4096.0, 32, 16384);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 1024.0, 64, 8192) as u32 };
     let mut solution = Solution::new(tracer, &solve, monitor)?;
 
