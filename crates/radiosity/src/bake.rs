@@ -10,7 +10,7 @@ use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Tracer;
 use radiosity_transport::Shadowing;
 use radiosity_view::lightmap::{
-    Charts, LightmapError, SeamParams, UnwrapInput, UnwrapParams, fill, fit_seams, shared_edges,
+    Charts, LightmapError, SeamParams, Texel, UnwrapInput, UnwrapParams, fill, fit_seams, shared_edges,
 };
 use radiosity_view::{Audit, Auditor, Field};
 use std::collections::HashMap;
@@ -199,6 +199,18 @@ pub struct Lightmap {
     pub seams: [f64; 2],
 }
 
+/// Texels that differ from a neighbour by more than this share get more points, as an edge may run through them.
+const EDGE_CONTRAST: f64 = 0.1;
+
+/// How many points: stairs of 1/16 are below what a display shows.
+const EDGE_POINTS: u32 = 16;
+
+/// How often an edge is followed on to further texels.
+const EDGE_ROUNDS: usize = 4;
+
+/// Fewest shadow rays at each of these points.
+const LEAST_RAYS: u32 = 8;
+
 /// Texels that the program spends where no density is asked for.
 const AUTOMATIC_TEXELS: f64 = 200_000.0;
 
@@ -233,11 +245,7 @@ pub fn lightmap(
     let atlas = charts.pack(&params)?;
 
     // Every texel is lit like a point of the surface; those inside solids are left to their neighbours.
-    let mut irradiance = Vec::new();
-    let mut count = 0;
-    for (page, size) in atlas.pages.iter().enumerate() {
-        let texels = atlas.texels(page);
-        count += texels.len();
+    let light = |texels: &[Texel], shadowing: &Shadowing| -> Result<Vec<Bands>, Error> {
         let at: Vec<Station> = texels
             .iter()
             .map(|texel| {
@@ -245,11 +253,29 @@ pub fn lightmap(
                 stations::station(tracer, face.triangle, face.mesh_uv(texel.uv.as_dvec2()), face.side)
             })
             .collect();
-        let mut values = solution.at(&at, Indirect::Field(&baked.field), &baked.shadowing, monitor)?.irradiance;
+        let mut values = solution.at(&at, Indirect::Field(&baked.field), shadowing, monitor)?.irradiance;
         for (value, station) in values.iter_mut().zip(&at) {
             if is_hidden(solution, station) {
                 *value = [f32::NAN; 3];
             }
+        }
+        Ok(values)
+    };
+    // The points of a texel that an edge runs through share its shadow rays.
+    let shared = Shadowing { rays: (baked.shadowing.rays / EDGE_POINTS).max(LEAST_RAYS), ..baked.shadowing };
+    let mut irradiance = Vec::new();
+    let mut count = 0;
+    for (page, size) in atlas.pages.iter().enumerate() {
+        let mut texels = atlas.texels(page);
+        count += texels.len();
+        let mut values = light(&texels, &baked.shadowing)?;
+        for _ in 0..EDGE_ROUNDS {
+            let more = atlas.finer(page, &texels, &values, EDGE_CONTRAST, EDGE_POINTS);
+            if more.is_empty() {
+                break;
+            }
+            values.extend(light(&more, &shared)?);
+            texels.extend(more);
         }
         irradiance.push(fill(*size, &texels, &values));
     }

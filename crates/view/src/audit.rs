@@ -81,7 +81,10 @@ impl<'a> Auditor<'a> {
             .into_par_iter()
             .map(|i| {
                 let pair = std::array::from_fn(|half| {
-                    let seed = seed << 48 ^ (i as u64) << 24 ^ u64::from(first) << 1 ^ half as u64;
+                    let seed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                        ^ (i as u64) << 32
+                        ^ u64::from(first) << 1
+                        ^ half as u64;
                     f64::from(luminance(referee.irradiance(&places[i], more, seed))) * f64::from(more)
                 });
                 let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;

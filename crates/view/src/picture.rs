@@ -1,4 +1,4 @@
-//! Pictures: which surfaces the pixels of a camera see, exposure, tone mapping, false colours.
+//! Pictures: which surfaces the pixels of a camera see, exposure, tone mapping.
 //!
 //! A pixel is sampled on a 4 × 4 grid. Samples that see the same smooth surface share one evaluation of irradiance,
 //! because light changes slowly within a pixel where edges do not; reflectance is looked up at each. Edges come out
