@@ -69,7 +69,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let start = std::time::Instant::now();
     let stages = Stages::default();
     let mut solve = options.solve;
-    solve.rays = solve.rays.max(rays_for(options.error, 256.0, 32, 2048));
+    solve.rays = solve.rays.max(rays_for(options.error, 512.0, 32, 2048));
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
     let mut solution = Solution::new(tracer, &solve, monitor)?;
     let most_paths = rays_for(options.error, 4096.0, 64, 1 << 16) as u32;
