@@ -49,6 +49,8 @@ pub struct Baked<'a> {
     pub solution: Solution<'a>,
     /// Its continuous indirect field.
     pub field: Field,
+    /// Rays that gather the indirect light at each point; 0 where the field is good enough.
+    pub gather: usize,
     /// Shadow rays that points are lit with.
     pub shadowing: Shadowing,
     /// What the referee says.
@@ -79,11 +81,22 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     loop {
         let field = solution.indirect_field();
         let answer = solution.at(&watched, Indirect::Field(&field), &shadowing, monitor)?;
-        let audit = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
+        let mut audit = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
+        let mut gather = 0;
+        if audit.upper > options.error {
+            // The field knows neither contacts below the size of its elements nor normals that are not the faces':
+            // gathering at each point does, and costs less than elements that small.
+            let rays = rays_for(options.error, 256.0, 32, 2048);
+            let answer = solution.at(&watched, Indirect::Gather { rays }, &shadowing, monitor)?;
+            let better = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
+            if better.upper < audit.upper {
+                (audit, gather) = (better, rays);
+            }
+        }
         rounds.push(Round {
             elements: solution.elements.len(),
             rays: solution.rays(),
-            gather: 0,
+            gather,
             shadow_rays: shadowing.rays,
             error: audit.error,
             upper: audit.upper,
@@ -102,7 +115,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let fits = Solution::memory(tracer, &next) <= next.memory;
         if achieved || rounds.len() > options.rounds || !fits {
             stages.absorb(&solution.stages);
-            return Ok(Baked { solution, field, shadowing, audit, achieved, rounds, stages });
+            return Ok(Baked { solution, field, gather, shadowing, audit, achieved, rounds, stages });
         }
         shadowing.rays *= 2;
         if noisy {
@@ -111,6 +124,16 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             stages.absorb(&solution.stages);
             drop(solution);
             solution = Solution::new(tracer, &next, monitor)?;
+        }
+    }
+}
+
+impl Baked<'_> {
+    /// How points get their indirect light; a point that is one of `of` whose mean counts does with as many rays less.
+    fn indirect(&self, of: usize) -> Indirect<'_> {
+        match self.gather {
+            0 => Indirect::Field(&self.field),
+            rays => Indirect::Gather { rays: (rays / of).max(8) },
         }
     }
 }
@@ -245,7 +268,7 @@ pub fn lightmap(
     let atlas = charts.pack(&params)?;
 
     // Every texel is lit like a point of the surface; those inside solids are left to their neighbours.
-    let light = |texels: &[Texel], shadowing: &Shadowing| -> Result<Vec<Bands>, Error> {
+    let light = |texels: &[Texel], shadowing: &Shadowing, of: usize| -> Result<Vec<Bands>, Error> {
         let at: Vec<Station> = texels
             .iter()
             .map(|texel| {
@@ -253,7 +276,7 @@ pub fn lightmap(
                 stations::station(tracer, face.triangle, face.mesh_uv(texel.uv.as_dvec2()), face.side)
             })
             .collect();
-        let mut values = solution.at(&at, Indirect::Field(&baked.field), shadowing, monitor)?.irradiance;
+        let mut values = solution.at(&at, baked.indirect(of), shadowing, monitor)?.irradiance;
         for (value, station) in values.iter_mut().zip(&at) {
             if is_hidden(solution, station) {
                 *value = [f32::NAN; 3];
@@ -268,13 +291,13 @@ pub fn lightmap(
     for (page, size) in atlas.pages.iter().enumerate() {
         let mut texels = atlas.texels(page);
         count += texels.len();
-        let mut values = light(&texels, &baked.shadowing)?;
+        let mut values = light(&texels, &baked.shadowing, 1)?;
         for _ in 0..EDGE_ROUNDS {
             let more = atlas.finer(page, &texels, &values, EDGE_CONTRAST, EDGE_POINTS);
             if more.is_empty() {
                 break;
             }
-            values.extend(light(&more, &shared)?);
+            values.extend(light(&more, &shared, EDGE_POINTS as usize)?);
             texels.extend(more);
         }
         irradiance.push(fill(*size, &texels, &values));
@@ -410,7 +433,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<Vec<LitPrimi
     }
 
     let all: Vec<Station> = at.concat();
-    let light = solution.at(&all, Indirect::Field(&baked.field), &baked.shadowing, monitor)?.irradiance;
+    let light = solution.at(&all, baked.indirect(1), &baked.shadowing, monitor)?.irradiance;
     // Vertices at one place of one smooth surface share their mean, so that no seam shows; hidden ones do not count.
     let mut shared: HashMap<PlaceKey, ([f64; 3], f64)> = HashMap::new();
     let grid = 4.0 * mesh.tolerance.max(1e-9) + 4e-3 * solution.element_size;
