@@ -236,7 +236,7 @@ fn bake_writes_model_picture_and_reports() {
     assert!(defect.abs() < 0.05, "{defect}");
     let solution = &report["solution"];
     assert!(solution["raw_closure"].as_f64().unwrap() < 1e-6);
-    assert!(solution["relative_residual"][0].as_f64().unwrap() <= 1e-5);
+    assert!(solution["relative_residual"][0].as_f64().unwrap() <= 1e-4);
     assert!(solution["guaranteed_bound"][0].as_f64().unwrap() > 0.0);
     let stages = report["time"]["stages"].as_array().unwrap();
     let (sum, whole) = (stages.iter().filter_map(|s| s["seconds"].as_f64()).sum::<f64>(), &report["time"]["seconds"]);

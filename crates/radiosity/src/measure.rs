@@ -35,7 +35,7 @@ impl Default for MeasureOptions {
 }
 
 /// Cells to aim for where they are looked up by a gather at each point.
-const LOOKED_UP_CELLS: usize = 30_000;
+const LOOKED_UP_CELLS: usize = 50_000;
 
 /// Fewest pairs of estimates that an audit judges by.
 const LEAST_WATCHED: usize = 64;

@@ -42,7 +42,7 @@ impl Default for SolveOptions {
             variation: 0.05,
             rays: 64,
             shadowing: Shadowing { places: 8, rays: 2 },
-            solver: Params { tolerance: 1e-5, max_steps: 500 },
+            solver: Params { tolerance: 1e-4, max_steps: 500 },
             memory: 4 << 30,
         }
     }
@@ -302,7 +302,7 @@ impl<'a> Solution<'a> {
     }
 
     /// Relative standard error of the irradiance of cells that comes from the rows' sampling, by the difference of their
-    /// two independent halves: root mean square over the exposed area, each cell by its own irradiance E, as the eye takes
+    /// two halves, which makes it a fifth to a third too large: root mean square over the exposed area, each cell by its own irradiance E, as the eye takes
     /// it, and by the weight E/(E + mean E), so that neither the dark insides of furniture nor a bright garden decide.
     pub fn row_noise(&self) -> f64 {
         let halves = self.table.halves(&self.values);

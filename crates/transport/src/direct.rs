@@ -18,7 +18,6 @@ use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Place, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Lights with more triangles than this are sampled by area; evaluating the polygon factor of each would cost more than
@@ -32,7 +31,7 @@ const MOST_WEIGHED_PIECES: usize = 4096;
 const GRAZING: f64 = 0.05;
 
 /// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
-/// much w varies. Fewer rays are averaged plainly, without any bias.
+/// much w varies. Fewer rays are averaged plainly, without any bias; pilots can do with the bias.
 const RATIO: u32 = 4;
 
 /// The streams of sample points that direct light uses: one for places, then one for each light.
@@ -118,12 +117,16 @@ struct Unshadowed {
     visible: Vec<[f64; 3]>,
     /// What became of the shadow rays at all places of the receiver.
     outcomes: u8,
+    /// Rays of a light from which on its visible share is a ratio.
+    ratio: u32,
 }
 
 /// A shadow ray came through.
 const LIT: u8 = 1;
 /// A shadow ray was stopped.
 const DARK: u8 = 2;
+/// What was found would be noisy even if all shadow rays had come through.
+const CHANCE: u8 = 4;
 
 impl Luminaires {
     /// Irradiance of every receiver from every light.
@@ -148,29 +151,37 @@ impl Luminaires {
         let seen = columns.seen.par_chunks_mut(CHUNK * lights);
         let chunks = seen.zip(columns.mean.par_chunks_mut(CHUNK)).zip(columns.shaded.par_chunks_mut(CHUNK));
         chunks.enumerate().try_for_each(|(chunk, ((seen, mean), shaded))| {
-            let mut scratch = self.scratch();
-            let mut sums = vec![[0f64; 6]; lights];
+            let mut scratch = self.scratch(RATIO);
+            let mut at: Vec<Place> = Vec::new();
+            let mut lit: Vec<[f64; 3]> = Vec::new();
             for (k, (seen, mean)) in seen.chunks_exact_mut(lights).zip(mean.iter_mut()).enumerate() {
                 let i = chunk * CHUNK + k;
-                sums.fill([0.0; 6]);
-                let (mut places, mut open) = (0.0, 0.0);
-                self.at_places(tracer, receivers, (i, 0..1), shadowing, &mut scratch, |_, index, place, visible| {
-                    let openness = openness(tracer, receivers, i, index, place);
-                    places += 1.0;
-                    open += openness;
-                    for (sum, e) in sums.iter_mut().zip(visible) {
+                (at.clear(), lit.clear());
+                self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |_, place, visible| {
+                    at.push(*place);
+                    lit.extend_from_slice(visible);
+                });
+                shaded[k] = scratch.outcomes & !CHANCE != LIT;
+                // Where all is lit or all is dark, what is seen from afar has the light of the whole.
+                let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
+                let near = receivers.near(i).filter(|_| mixed || lights > shadowing.rays as usize);
+                let open: Vec<f64> = match near {
+                    Some(near) => openness(tracer, &at, near, receivers.seed(i)),
+                    None => vec![1.0; at.len()],
+                };
+                let (places, all_open) = (at.len() as f64, open.iter().sum::<f64>());
+                for (l, seen) in seen.iter_mut().enumerate() {
+                    let mut sums = [0f64; 6];
+                    for (visible, open) in lit.chunks_exact(lights).zip(&open) {
                         for band in 0..3 {
-                            sum[band] += e[band];
-                            sum[band + 3] += openness * e[band];
+                            sums[band] += visible[l][band];
+                            sums[band + 3] += open * visible[l][band];
                         }
                     }
-                });
-                shaded[k] = scratch.outcomes != LIT;
-                for (seen, sum) in seen.iter_mut().zip(&sums) {
                     for band in 0..3 {
-                        let over_area = sum[band] / f64::max(places, 1.0);
+                        let over_area = sums[band] / f64::max(places, 1.0);
                         mean[band] += over_area as f32;
-                        seen[band] = if open > 0.0 { sum[band + 3] / open } else { over_area } as f32;
+                        seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
                     }
                 }
             }
@@ -200,13 +211,21 @@ impl Luminaires {
         const CHUNK: usize = 64;
         let done = AtomicUsize::new(0);
         variation.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, out)| {
-            let mut scratch = self.scratch();
+            let mut scratch = self.scratch(1);
             for (k, out) in out.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
                 let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
-                self.at_places(tracer, receivers, (i, 1..3), shadowing, &mut scratch, |set, index, _, visible| {
-                    at[set as usize - 1][index as usize] = Some(visible.iter().map(|e| luminance_of(*e)).sum::<f64>());
-                });
+                for set in 1..3 {
+                    self.at_places(tracer, receivers, (i, set), shadowing, &mut scratch, |index, _, visible| {
+                        let sum = visible.iter().map(|e| luminance_of(*e)).sum::<f64>();
+                        at[set as usize - 1][index as usize] = Some(sum);
+                    });
+                    if scratch.outcomes == LIT || scratch.outcomes == DARK {
+                        // There is no noise to keep apart.
+                        at[1] = at[0].clone();
+                        break;
+                    }
+                }
                 let [first, second] = at;
                 let pairs: Vec<(f64, f64)> = first.into_iter().zip(second).filter_map(|(a, b)| a.zip(b)).collect();
                 if pairs.len() < 2 {
@@ -235,12 +254,12 @@ impl Luminaires {
             Light::Area { pieces, .. } => {
                 let mut factors = [0.0; MOST_EXACT_PIECES];
                 let here = unshadowed(pieces, place, &mut factors);
-                from_few((pieces, &factors), here, tracer, place, (&sequence, 0, 1), seed).0
+                from_few((pieces, &factors), here, tracer, place, (&sequence, 0, 1), (RATIO, seed)).0
             }
         }
     }
 
-    fn scratch(&self) -> Unshadowed {
+    fn scratch(&self, ratio: u32) -> Unshadowed {
         let lights = self.lights.len();
         Unshadowed {
             irradiance: vec![[0.0; 3]; lights],
@@ -249,23 +268,23 @@ impl Luminaires {
             used: vec![0; lights],
             visible: vec![[0.0; 3]; lights],
             outcomes: 0,
+            ratio,
         }
     }
 
-    /// Calls back with the set, the number and the place for each place of a receiver that is not buried, and with what
-    /// each light gives there. The sets 1 and 2 are independent shadow rays at the same places, other ones than those of
-    /// set 0.
+    /// Calls back with the number and the place for each place of a receiver that is not buried, and with what each light
+    /// gives there. The sets 1 and 2 are independent shadow rays at the same places, other ones than those of set 0.
     fn at_places(
         &self,
         tracer: &Tracer,
         receivers: &impl Receivers,
-        (i, sets): (usize, Range<u32>),
+        (i, set): (usize, u32),
         shadowing: &Shadowing,
         scratch: &mut Unshadowed,
-        mut visit: impl FnMut(u32, u32, &Place, &[[f64; 3]]),
+        mut visit: impl FnMut(u32, &Place, &[[f64; 3]]),
     ) {
         let seed = receivers.seed(i);
-        let places = Sequence::new(if sets.start == 0 { seed } else { hash(seed) }, DIRECT);
+        let places = Sequence::new(if set == 0 { seed } else { hash(seed) }, DIRECT);
         scratch.used.fill(0);
         scratch.outcomes = 0;
         let Some(site) = receivers.site(i) else { return };
@@ -274,17 +293,15 @@ impl Luminaires {
             let [offset, _, x, y] = places.point(index);
             let place = site.place(x, y);
             let total = self.unshadowed(&place, scratch);
-            for set in sets.clone() {
-                let (seed, offset) = match set {
-                    0 => (seed, offset),
-                    _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ index) ^ hash(set)))),
-                };
-                let outcome = self.shadow(tracer, &place, (rays, total), (f64::from(offset), seed, index), scratch);
-                scratch.outcomes |= outcome;
-                // A place inside a solid is not a part of what is seen; one that is not has rays that get away.
-                if outcome & DARK == 0 || !receivers.buried(tracer, &place, hash(seed ^ index)) {
-                    visit(set, index, &place, &scratch.visible);
-                }
+            let (seed, offset) = match set {
+                0 => (seed, offset),
+                _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ index) ^ hash(set)))),
+            };
+            let outcome = self.shadow(tracer, &place, (rays, total), (f64::from(offset), seed, index), scratch);
+            scratch.outcomes |= outcome;
+            // A place inside a solid is not a part of what is seen; one that is not has rays that get away.
+            if outcome & DARK == 0 || !receivers.buried(tracer, &place, hash(seed ^ index)) {
+                visit(index, &place, &scratch.visible);
             }
         }
     }
@@ -354,6 +371,7 @@ impl Luminaires {
             reached += expected;
             let n = (reached.floor() - before) as u32;
             if n == 0 {
+                outcomes |= CHANCE;
                 continue;
             }
             let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), scratch.used[l], n);
@@ -362,7 +380,7 @@ impl Luminaires {
             let (mut e, outcome) = match light {
                 Light::Point(light) => from_point(light, tracer, place, n, salt),
                 Light::Area { pieces, .. } if pieces.len() <= MOST_EXACT_PIECES => {
-                    from_few((pieces, factors), scratch.irradiance[l], tracer, place, samples, salt)
+                    from_few((pieces, factors), scratch.irradiance[l], tracer, place, samples, (scratch.ratio, salt))
                 }
                 Light::Area { pieces, .. } if known > 0 => from_many((pieces, factors), tracer, place, samples, salt),
                 Light::Area { pieces, cumulative, .. } => from_many((pieces, cumulative), tracer, place, samples, salt),
@@ -370,6 +388,7 @@ impl Luminaires {
             if expected < 1.0 {
                 // It came about with this probability.
                 e = e.map(|e| e / expected);
+                outcomes |= CHANCE;
             }
             outcomes |= outcome;
             scratch.visible[l] = e;
@@ -378,16 +397,19 @@ impl Luminaires {
     }
 }
 
-/// Share of the hemisphere of a place of a receiver in which nothing is near, by [`OPEN`] rays.
-fn openness(tracer: &Tracer, receivers: &impl Receivers, i: usize, index: u32, place: &Place) -> f64 {
-    let Some(near) = receivers.near(i) else { return 1.0 };
-    let (frame, sequence) = (frame(place.normal), Sequence::new(receivers.seed(i), OPENNESS));
-    let open = (index * OPEN..(index + 1) * OPEN).filter(|&k| {
-        let [u, v, _, _] = sequence.point(k);
-        let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-        !tracer.blocked(&tracer.ray(place, direction, near), hash(k))
-    });
-    open.count() as f64 / f64::from(OPEN)
+/// Share of the hemisphere of each place of a receiver in which nothing is nearer than `near`, by [`OPEN`] rays.
+fn openness(tracer: &Tracer, places: &[Place], near: f64, seed: u32) -> Vec<f64> {
+    let sequence = Sequence::new(seed, OPENNESS);
+    let open = |(index, place): (usize, &Place)| {
+        let (first, frame) = (OPEN * index as u32, frame(place.normal));
+        let rays = (first..first + OPEN).filter(|&k| {
+            let [u, v, _, _] = sequence.point(k);
+            let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+            !tracer.blocked(&tracer.ray(place, direction, near), hash(k))
+        });
+        rays.count() as f64 / f64::from(OPEN)
+    };
+    places.iter().enumerate().map(open).collect()
 }
 
 fn luminance_of(e: [f64; 3]) -> f64 {
@@ -435,7 +457,7 @@ fn from_few(
     tracer: &Tracer,
     place: &Place,
     (sequence, first, n): Samples,
-    salt: u32,
+    (ratio, salt): (u32, u32),
 ) -> ([f64; 3], u8) {
     let total: f64 = factors.iter().sum();
     if total <= 0.0 {
@@ -474,8 +496,11 @@ fn from_few(
             }
         }
     }
+    if n < ratio {
+        outcome |= CHANCE;
+    }
     let irradiance = std::array::from_fn(|band| {
-        if n < RATIO {
+        if n < ratio {
             visible[band] / f64::from(n)
         } else if sampled[band] > 0.0 {
             here[band] * visible[band] / sampled[band]
@@ -541,7 +566,7 @@ fn from_many(
             outcome |= DARK;
         }
     }
-    (sum.map(|s| s / f64::from(n)), outcome)
+    (sum.map(|s| s / f64::from(n)), outcome | CHANCE)
 }
 
 /// cos θ cos θ'/(π r²) of two places, 1/m².

@@ -49,7 +49,7 @@ pub struct Gather<'a> {
 }
 
 impl Gather<'_> {
-    /// Mean incoming radiosity at each receiver over `rays` rays, as two independent halves: its indirect irradiance.
+    /// Mean incoming radiosity at each receiver over `rays` rays, as two halves: its indirect irradiance.
     ///
     /// # Errors
     /// [`Stopped`] if `progress` says so.
@@ -69,14 +69,14 @@ impl Gather<'_> {
                 let i = chunk * CHUNK + k;
                 let Some(site) = receivers.site(i) else { continue };
                 let (seed, frame) = (receivers.seed(i), frame(site.normal));
+                let sequence = Sequence::new(seed, GATHER);
                 for half in 0..2 {
-                    let sequence = Sequence::new(seed, GATHER + half);
                     let mut sum = [0f64; 3];
-                    for index in 0..half_rays {
+                    for index in half * half_rays..(half + 1) * half_rays {
                         let [u, v, x, y] = sequence.point(index);
                         let place = site.place(x, y);
                         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-                        let arriving = self.arriving(&place, direction, hash(seed ^ index << 1 ^ half));
+                        let arriving = self.arriving(&place, direction, hash(seed ^ index));
                         (0..3).for_each(|band| sum[band] += arriving[band]);
                     }
                     mean[half as usize] = sum.map(|s| (s / f64::from(half_rays)) as f32);

@@ -2,9 +2,10 @@
 //!
 //! Receiver i sends M cosine-distributed rays (Malley 1988) from stratified points on itself; entry (i, m) is the id of
 //! what ray m met: an element, a sky patch, or nothing. Each entry weighs 1/M, so a row sums to exactly one and energy
-//! cannot appear. The rays of a row are two independently scrambled halves: half their difference is the standard
-//! error of the row, live and for any right-hand side. Doubling M appends columns to the table; nothing is traced
-//! twice. The elements of a divided cell share its M rays: a receiver sees many of them and averages their noise out.
+//! cannot appear. The rays of a row are the two halves of one scrambled sequence. Half their difference is the standard
+//! error of the row, live and for any right-hand side, and on the safe side: 1.2 to 1.35 times the true one in the
+//! Cornell box, as the halves complement each other (independent ones would leave 15 % more noise). Doubling M appends
+//! columns to the table; nothing is traced twice. The elements of a divided cell share its M rays: a receiver sees many of them and averages their noise out.
 //! It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
 
 use crate::{Progress, Receivers, Stopped};
@@ -58,7 +59,7 @@ impl IdSpace<'_> {
 /// known to the exposure mask, so each attempt succeeds with probability 1/2 or more.
 const ATTEMPTS: u32 = 8;
 
-/// Rays `from..to` of both halves of a receiver's row; `out` gets the ids of the first half, then of the second.
+/// Rays `2 from..2 to` of a receiver's row, in two halves; `out` gets the ids of the first half, then of the second.
 fn trace_row(
     tracer: &Tracer,
     ids: &IdSpace,
@@ -73,11 +74,11 @@ fn trace_row(
         return;
     };
     let frame = frame(site.normal);
+    let sequence = Sequence::new(seed, stream);
     for half in 0..2 {
-        let sequence = Sequence::new(seed, stream + half);
-        for index in from..to {
+        for index in (0..to - from).map(|k| 2 * from + half * (to - from) + k) {
             let [u, v, mut x, mut y] = sequence.point(index);
-            let salt = hash(seed ^ index) ^ half;
+            let salt = hash(seed ^ index);
             let mut id = ids.nothing();
             for attempt in 0..ATTEMPTS {
                 let place = site.place(x, y);
@@ -96,8 +97,8 @@ fn trace_row(
     }
 }
 
-/// Rays of one block of columns. Row i is `ids[starts[i]..starts[i + 1]]`, the first half of it from the first of the
-/// two independent sequences.
+/// Rays of one block of columns. Row i is `ids[starts[i]..starts[i + 1]]`, the first half of it from the first half
+/// of the points.
 #[derive(Clone, Debug)]
 struct Block {
     starts: Vec<usize>,
@@ -246,7 +247,7 @@ impl HitTable {
         self.halves(values).into_iter().map(|[a, b]| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect()
     }
 
-    /// The same for the two independent halves of each row.
+    /// The same for the two halves of each row.
     pub fn halves(&self, values: &[[f32; 4]]) -> Vec<[[f32; 4]; 2]> {
         assert_eq!(values.len(), self.all_ids);
         let n = self.space.area.len();
