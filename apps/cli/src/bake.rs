@@ -8,9 +8,8 @@ use crate::report::{LightmapReport, Report};
 use crate::views::{self, View};
 use crate::{Failure, Global, numbers};
 use clap::{Args, ValueEnum};
-use radiosity::io::gltf_out::{Encoding, PageImage, Style, lit_glb};
-use radiosity::io::image_out::{encode_exr, encode_png};
-use radiosity::view::picture::srgb;
+use radiosity::io::gltf_out::{Encoding, Style, lit_glb};
+use radiosity::io::image_out::encode_exr;
 use radiosity::{Mesh, Tracer};
 use std::path::{Path, PathBuf};
 
@@ -92,14 +91,14 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
 
     let (mut pages, mut lightmap) = (Vec::new(), None);
-    let model = if arguments.vertices || arguments.unlit {
+    let (model, audit) = if arguments.vertices || arguments.unlit {
         progress.part("vertex light");
-        let primitives = radiosity::vertex_light(&baked, progress)?;
+        let light = radiosity::vertex_light(&baked, progress)?;
         let style = match arguments.vertices {
             true => Style::Vertices,
             false => Style::Unlit { exposure: exposure.exp2() as f32 },
         };
-        lit_glb(&input.scene, input.document.as_ref(), &primitives, &style)
+        (lit_glb(&input.scene, input.document.as_ref(), &light.primitives, &style), light.audit)
     } else {
         progress.part("lightmap");
         let map = radiosity::lightmap(&baked, arguments.texels_per_metre, arguments.max_atlas, progress)?;
@@ -108,22 +107,21 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             TexelEncoding::Srgb => Encoding::Srgb,
             TexelEncoding::Linear => Encoding::Linear,
         };
-        let mut images = Vec::new();
         for (page, (size, texels)) in map.pages.iter().zip(&map.irradiance).enumerate() {
-            images.push(page_image(*size, texels, encoding)?);
             let beside = page_path(&target, page);
             outputs.stage(&beside, &encode_exr(size[0], size[1], texels).map_err(Failure::work)?)?;
             pages.push(beside);
         }
-        let style = Style::Lightmap { pages: images, encoding, exposure: 1.0 };
-        lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style)
+        let style = Style::Lightmap { pages: map.images(encoding)?, encoding, exposure: 1.0 };
+        (lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style), map.audit)
     };
     progress.part("writing");
     outputs.stage(&target, &model.map_err(|error| Failure::work(format!("{}: {error}", target.display())))?)?;
     let files = std::iter::once(target.as_path()).chain(pages.iter().map(PathBuf::as_path)).chain(written);
     let files: Vec<&Path> = files.chain(arguments.report.iter().map(PathBuf::as_path)).collect();
 
-    let report = Report::new(&input, &mesh, &arguments.solve, (&baked, view.as_ref()), lightmap, &files, progress);
+    let report =
+        Report::new(&input, &mesh, &arguments.solve, (&baked, view.as_ref()), (&audit, lightmap), &files, progress);
     for path in &arguments.report {
         let text = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,
@@ -145,19 +143,6 @@ fn output_path(arguments: &Arguments) -> PathBuf {
 
 fn page_path(target: &Path, page: usize) -> PathBuf {
     target.with_extension(format!("lightmap{page}.exr"))
-}
-
-/// A page as 8-bit PNG, scaled by its maximum.
-fn page_image(size: [u32; 2], texels: &[radiosity::Bands], encoding: Encoding) -> Result<PageImage, Failure> {
-    let peak = texels.iter().flatten().fold(0f32, |m, x| m.max(*x));
-    let intensity = if peak > 0.0 { peak } else { 1.0 };
-    let encode = |x: f32| {
-        let share = (x / intensity).clamp(0.0, 1.0);
-        let coded = if encoding == Encoding::Srgb { srgb(share) } else { share };
-        (coded * 255.0).round() as u8
-    };
-    let pixels: Vec<[u8; 3]> = texels.iter().map(|t| t.map(encode)).collect();
-    Ok(PageImage { png: encode_png(size[0], size[1], &pixels).map_err(Failure::work)?, intensity })
 }
 
 /// The pictures of a page.

@@ -5,6 +5,8 @@ pub const ESTIMATED: &str = "the audit's best estimate of the relative error";
 pub const UPPER: &str = "one-sided 95 % bound: with 95 % confidence the error is smaller";
 pub const LOWER: &str = "one-sided 95 % bound: with 95 % confidence the error is larger";
 pub const LOWER_IS_ZERO: &str = "one-sided 95 % bound: the audit cannot tell the error from none";
+pub const SOLUTION: &str = "the same for the solution, before it is written into texels or vertices";
+pub const FINER: &str = "more --texels-per-metre, or a smaller --element-size for light at vertices, keep more of it";
 pub const BIAS: &str = "mean difference over mean illuminance";
 
 pub const LEAST: &str = "the darkest element";
@@ -43,6 +45,7 @@ pub const ABOUT: &[(&str, &str)] = &[
     ("error.upper_95_one_sided", UPPER),
     ("error.lower_95_one_sided", LOWER),
     ("error.bias", BIAS),
+    ("error.solution_estimated", SOLUTION),
     ("illuminance.least", "lx; the darkest element"),
     ("illuminance.mean", "lx; by area, over all exposed surfaces"),
     ("illuminance.classes", "lx; share of the exposed area from one illuminance to another"),

@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             None
         }
     };
-    let error = ErrorReport::new(&measured.audit, &arguments.solve, measured.achieved);
+    let error = ErrorReport::new(&measured.audit, &measured.audit, &arguments.solve);
     if global.json {
         let values: Option<&[radiosity::Bands]> = arguments.output.is_none().then_some(&measured.irradiance);
         let result = serde_json::json!({

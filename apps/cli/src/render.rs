@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
     outputs.commit()?;
 
-    let error = ErrorReport::new(&baked.audit, &arguments.solve, baked.achieved);
+    let error = ErrorReport::new(&baked.audit, &baked.audit, &arguments.solve);
     if global.json {
         let result = serde_json::json!({
             "event": "result", "error": error, "output": arguments.output, "width": width, "height": height,

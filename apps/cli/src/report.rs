@@ -88,14 +88,18 @@ pub struct ErrorReport {
     pub mean_illuminance: f64,
     /// Seed of the audit.
     pub seed: u64,
+    /// The audit's estimate for the solution itself, before it is written into texels or vertices.
+    pub solution_estimated: f64,
+    /// Its one-sided 95 % bound from above.
+    pub solution_upper_95_one_sided: f64,
 }
 
 impl ErrorReport {
-    /// Of an audit and what was asked of it.
-    pub fn new(audit: &Audit, solve: &input::SolveArguments, achieved: bool) -> ErrorReport {
+    /// Of an audit of what is handed out, one of the solution that it was read from, and what was asked.
+    pub fn new(audit: &Audit, solution: &Audit, solve: &input::SolveArguments) -> ErrorReport {
         ErrorReport {
             asked: solve.error,
-            achieved,
+            achieved: audit.upper <= solve.error,
             estimated: audit.error,
             upper_95_one_sided: audit.upper,
             lower_95_one_sided: audit.lower,
@@ -105,7 +109,14 @@ impl ErrorReport {
             paths_per_estimate: audit.paths,
             mean_illuminance: audit.mean_illuminance,
             seed: solve.seed,
+            solution_estimated: solution.error,
+            solution_upper_95_one_sided: solution.upper,
         }
+    }
+
+    /// Whether the solution is good enough and too little of it reached the texels or vertices.
+    pub fn is_lost_in_writing(&self) -> bool {
+        !self.achieved && self.solution_upper_95_one_sided <= self.asked
     }
 
     /// In a line.
@@ -116,7 +127,13 @@ impl ErrorReport {
             upper if upper.is_finite() => format!("at most {} with 95 % confidence", percent(upper)),
             _ => "without a bound, since the audit had too few points".to_owned(),
         };
-        format!("error asked {}: {verdict}; audit says {}, {bound}", percent(self.asked), percent(self.estimated))
+        let mut line =
+            format!("error asked {}: {verdict}; audit says {}, {bound}", percent(self.asked), percent(self.estimated));
+        if self.is_lost_in_writing() {
+            let within = percent(self.solution_upper_95_one_sided);
+            line += &format!("; the solution itself is within {within}: {}", figures::FINER);
+        }
+        line
     }
 }
 
@@ -198,7 +215,7 @@ impl Report {
         mesh: &Mesh,
         solve: &input::SolveArguments,
         (baked, view): (&Baked, Option<&View>),
-        lightmap: Option<LightmapReport>,
+        (written, lightmap): (&Audit, Option<LightmapReport>),
         outputs: &[&Path],
         progress: &Progress,
     ) -> Report {
@@ -227,7 +244,7 @@ impl Report {
                 lights: lights.map(|(i, l)| light((i, l.name()))).collect(),
                 area: (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum(),
             },
-            error: ErrorReport::new(&baked.audit, solve, baked.achieved),
+            error: ErrorReport::new(written, &baked.audit, solve),
             illuminance,
             rounds: baked.rounds.clone(),
             balance,

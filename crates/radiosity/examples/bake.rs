@@ -2,9 +2,7 @@
 
 #![expect(clippy::print_stdout, reason = "an example shows its answer")]
 
-use radiosity::io::gltf_out::{Encoding, PageImage, Style, write_lit};
-use radiosity::io::image_out::encode_png;
-use radiosity::view::picture::srgb;
+use radiosity::io::gltf_out::{Encoding, Style, write_lit};
 use radiosity::{BakeOptions, Mesh, Tracer, bake, cornell_box, lightmap};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -15,15 +13,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let baked = bake(&tracer, &BakeOptions { error: 0.02, ..BakeOptions::default() }, &())?;
     let map = lightmap(&baked, None, 4096, &())?;
 
-    // Pages of 8 bits: irradiance as a share of the page's brightest texel.
-    let mut pages = Vec::new();
-    for ([width, height], lux) in map.pages.iter().zip(&map.irradiance) {
-        let brightest = lux.iter().flatten().fold(f32::MIN_POSITIVE, |most, e| most.max(*e));
-        let texels: Vec<[u8; 3]> = lux.iter().map(|e| e.map(|e| (255.0 * srgb(e / brightest)).round() as u8)).collect();
-        pages.push(PageImage { png: encode_png(*width, *height, &texels)?, intensity: brightest });
-    }
-    let style = Style::Lightmap { pages, encoding: Encoding::Srgb, exposure: 1.0 };
+    let style = Style::Lightmap { pages: map.images(Encoding::Srgb)?, encoding: Encoding::Srgb, exposure: 1.0 };
     write_lit(&scene, None, &map.primitives, &style, path.as_ref())?;
-    println!("{}: error at most {:.2} %", path.display(), 100.0 * baked.audit.upper);
+    println!("{}: error at most {:.2} %", path.display(), 100.0 * map.audit.upper);
     Ok(())
 }

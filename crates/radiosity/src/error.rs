@@ -27,6 +27,9 @@ pub enum Error {
     /// The lightmap cannot be laid out.
     #[error("lightmap: {0}")]
     Lightmap(radiosity_view::lightmap::LightmapError),
+    /// A page of a lightmap cannot be encoded.
+    #[error("picture of a lightmap: {0}")]
+    Picture(String),
     /// The scene has nothing to compute.
     #[error("{0}")]
     Empty(&'static str),

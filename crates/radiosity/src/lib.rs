@@ -18,20 +18,25 @@ pub mod bake;
 mod cornell;
 mod division;
 mod error;
+mod faces;
+mod lightmap;
 pub mod measure;
 mod monitor;
 pub mod render;
 mod solution;
 pub mod stations;
+mod vertex_light;
 
 pub use answer::{Answer, Indirect};
-pub use bake::{BakeOptions, Baked, Lightmap, bake, lightmap, vertex_light};
+pub use bake::{BakeOptions, Baked, bake};
 pub use cornell::cornell_box;
 pub use error::Error;
+pub use lightmap::{Lightmap, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};
 pub use monitor::{Monitor, Stages};
 pub use render::{RenderOptions, place_camera, render};
 pub use solution::{Balance, Solution, SolveOptions};
+pub use vertex_light::{VertexLight, vertex_light};
 
 pub use radiosity_io as io;
 pub use radiosity_scene::{

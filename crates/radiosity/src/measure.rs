@@ -114,7 +114,7 @@ pub fn measure(
         watched.extend_from_within(..);
     }
     let mut auditor = Auditor::new(tracer, watched.iter().map(|&i| places[i]).collect(), options.seed);
-    let most_paths = rays_for(options.error, 4096.0, 64, 1 << 16) as u32;
+    let most_paths = most_paths(options.error);
     let mut rounds = Vec::new();
     loop {
         let answer = solution.gathered(&places, gather, &shadowing, monitor)?;
@@ -155,6 +155,11 @@ pub fn measure(
             solution.refine(rays, monitor)?;
         }
     }
+}
+
+/// Paths per estimate that an audit spends at most.
+pub(crate) fn most_paths(error: f64) -> u32 {
+    rays_for(error, 4096.0, 64, 1 << 16) as u32
 }
 
 /// Judges an answer, spending the referee's paths while the target lies between the two bounds: taking an estimate for

@@ -156,7 +156,8 @@ impl Luminaires {
             let mut lit: Vec<[f64; 3]> = Vec::new();
             for (k, (seen, mean)) in seen.chunks_exact_mut(lights).zip(mean.iter_mut()).enumerate() {
                 let i = chunk * CHUNK + k;
-                (at.clear(), lit.clear());
+                at.clear();
+                lit.clear();
                 self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |_, place, visible| {
                     at.push(*place);
                     lit.extend_from_slice(visible);

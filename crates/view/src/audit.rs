@@ -41,6 +41,7 @@ pub struct Audit {
 
 /// Referee estimates at a fixed set of points, kept and refined while answers come and go. Judging several answers by
 /// the same estimates is fair to each, and costs the referee's paths once.
+#[derive(Clone)]
 pub struct Auditor<'a> {
     referee: Referee<'a>,
     places: Vec<Place>,

@@ -18,6 +18,7 @@ const SURE_BOUNCES: usize = 3;
 const ALL_POINT_LIGHTS: usize = 8;
 
 /// An unbiased estimator of irradiance.
+#[derive(Clone)]
 pub struct Referee<'a> {
     tracer: &'a Tracer<'a>,
     emitters: Vec<Emitter>,
@@ -27,6 +28,7 @@ pub struct Referee<'a> {
     emitter_of: Vec<[u32; 2]>,
 }
 
+#[derive(Clone)]
 struct Emitter {
     triangle: u32,
     normal: DVec3,

@@ -45,6 +45,8 @@ fn example(rounds: usize) -> Report {
             paths_per_estimate: 256,
             mean_illuminance: 412.0,
             seed: 17,
+            solution_estimated: 0.9 * estimated,
+            solution_upper_95_one_sided: 0.9 * upper,
         },
         illuminance: Illuminance {
             least: 3.2,

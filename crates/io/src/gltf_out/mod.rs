@@ -3,8 +3,8 @@
 //! From a glTF source its JSON is kept, so that names, materials, pictures, cameras, animations, extras and unknown
 //! extensions survive; external buffers and pictures move into the file; what was compressed is written plain. Every
 //! placed primitive gets vertices of its own, since two instances never share their light: the first node of a mesh
-//! keeps its index, further ones get appended copies, EXT_mesh_gpu_instancing becomes child nodes. From any other
-//! source the JSON is built from the [`Scene`].
+//! keeps its index, further ones get appended copies, EXT_mesh_gpu_instancing becomes child nodes. Lamps of
+//! KHR_lights_punctual, whose light is now in the surfaces, move into the extras of their nodes. From any other source the JSON is built from the [`Scene`].
 //!
 //! What a value means: irradiance E in lx per band. In a lightmap E = texel (decoded) × `intensity` of MOZ_lightmap;
 //! three.js adds `texel · intensity · albedo/π` to the reflected light, so it shows the luminance B = albedo · E/π
@@ -13,6 +13,7 @@
 //! shown with, and any viewer shows them.
 
 mod glb;
+mod lamps;
 mod materials;
 mod plain;
 mod rewrite;

@@ -2,7 +2,7 @@
 
 use super::glb::{Builder, Target};
 use super::materials::Materials;
-use super::{LitPrimitive, Style, WriteError, vertices};
+use super::{LitPrimitive, Style, WriteError, lamps, vertices};
 use crate::gltf::Document;
 use crate::gltf::json::{list, numbers, whole};
 use glam::DMat4;
@@ -113,6 +113,7 @@ pub(super) fn rewrite(
         place(&mut builder, node, &meshes, instances.as_deref());
     }
 
+    lamps::take_out(&mut builder, document);
     embed_pictures(&mut builder, document);
     compact(&mut builder, document, old_views)?;
     finish_names(&mut builder);

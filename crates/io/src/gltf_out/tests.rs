@@ -189,6 +189,36 @@ fn what_the_author_wrote_survives_and_what_nobody_uses_goes() {
 }
 
 #[test]
+fn lamps_that_were_baked_shine_no_second_time() {
+    let mut source = source();
+    source["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing", "KHR_lights_punctual"]);
+    let bulb = json!({ "type": "point", "name": "bulb", "intensity": 60 });
+    source["extensions"] = json!({ "KHR_lights_punctual": { "lights": [bulb] } });
+    source["nodes"][5]["extensions"] = json!({ "KHR_lights_punctual": { "light": 0 } });
+    let lit = |source: &Value| {
+        let before = load(source.to_string().as_bytes());
+        assert_eq!(before.scene.lights.len(), 1);
+        let lit = halved(&before.scene, at_vertices);
+        load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &Style::Vertices).unwrap())
+    };
+    let after = lit(&source);
+    assert!(after.scene.lights.is_empty());
+    let json = &after.document.unwrap().json;
+    assert_eq!(json["nodes"][5], json!({ "name": "a", "extras": { "KHR_lights_punctual": bulb } }));
+    assert_eq!((json.get("extensions"), json.get("extensionsUsed")), (None, None));
+
+    // A lamp of another scene has not been baked and stays.
+    source["scenes"] = json!([{ "nodes": [0, 1, 2, 3, 4] }, { "nodes": [7] }]);
+    let nodes = source["nodes"].as_array_mut().unwrap();
+    nodes.push(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    let after = lit(&source);
+    let json = &after.document.unwrap().json;
+    assert_eq!(json["nodes"][7]["extensions"]["KHR_lights_punctual"]["light"], 0);
+    assert_eq!(json["extensions"]["KHR_lights_punctual"]["lights"][0], bulb);
+    assert_eq!(json["extensionsUsed"], json!(["KHR_lights_punctual"]));
+}
+
+#[test]
 fn vertex_light_stands_beside_the_authors_colours() {
     let before = load(source().to_string().as_bytes());
     let lit = halved(&before.scene, at_vertices);

@@ -2,6 +2,7 @@
 //! pushed up a pyramid and pulled back down where nothing is known), so that mip-maps and wide filters stay clean.
 
 use super::Texel;
+use glam::Vec2;
 use radiosity_scene::Bands;
 
 /// A row-major picture of `page` = width and height with `values[i]` at `texels[i]`, the mean where a texel is named
@@ -68,6 +69,20 @@ impl Level {
         }
         Level { width, height, known }
     }
+}
+
+/// What a viewer reads from a page at texture coordinates: the bilinear mean of four texels.
+pub fn look_up(size: [u32; 2], page: &[Bands], uv: Vec2) -> Bands {
+    let [width, height] = size.map(|side| side as usize);
+    let split = |x: f32, side: usize| {
+        let x = (x * side as f32 - 0.5).clamp(0.0, (side - 1) as f32);
+        let low = x as usize;
+        (low, (low + 1).min(side - 1), x - low as f32)
+    };
+    let ((left, right, across), (top, bottom, down)) = (split(uv.x, width), split(uv.y, height));
+    let mix = |a: Bands, b: Bands, share: f32| std::array::from_fn(|k| a[k] + share * (b[k] - a[k]));
+    let row = |y: usize| mix(page[y * width + left], page[y * width + right], across);
+    mix(row(top), row(bottom), down)
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ mod seams;
 mod texels;
 
 pub use edges::{SharedEdge, shared_edges};
-pub use fill::fill;
+pub use fill::{fill, look_up};
 pub use flatten::Charts;
 pub use seams::{SeamInfo, SeamParams, fit_seams};
 pub use texels::Texel;
