@@ -4,14 +4,12 @@ use crate::answer::Station;
 use crate::bake::Baked;
 use crate::faces::{faces, is_hidden, lit_vertex};
 use crate::{Error, Monitor, stations};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use radiosity_io::gltf_out::{Light, LitPrimitive};
-use radiosity_scene::Side;
-use radiosity_view::Audit;
+use radiosity_scene::{Bands, Side};
+use radiosity_view::{Audit, Shared, shared_corner};
+use rayon::prelude::*;
 use std::collections::HashMap;
-
-/// A place and a normal, both on a grid.
-type PlaceKey = ([i64; 3], [i32; 3]);
 
 /// Light at vertices.
 pub struct VertexLight {
@@ -50,7 +48,8 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
         baked.watched().iter().map(|s| ((s.place.triangle as usize, s.side), Vec::new())).collect();
 
     let mut primitives: Vec<LitPrimitive> = Vec::new();
-    let mut at: Vec<Vec<Station>> = Vec::new();
+    let mut at: Vec<Station> = Vec::new();
+    let mut names: Vec<Option<Shared>> = Vec::new();
     for layer in faces(solution).chunk_by(|a, b| (a.object, a.side) == (b.object, b.side)) {
         let mut primitive = LitPrimitive {
             object: layer[0].object,
@@ -59,7 +58,6 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
             flipped: layer[0].side == Side::Back,
             light: Light::None,
         };
-        let mut places = Vec::new();
         let mut known: HashMap<([u32; 3], [u32; 3], u32), u32> = HashMap::new();
         for face in layer {
             let k = solution.elements.division(face.triangle);
@@ -85,7 +83,8 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
                     primitive.vertices.push(lit);
                     // A little towards the middle: the light of this triangle, not of what touches its border.
                     let inside = uv + 1e-3 * (DVec2::splat(1.0 / 3.0) - uv);
-                    places.push(stations::station(tracer, face.triangle, inside, face.side));
+                    at.push(stations::station(tracer, face.triangle, inside, face.side));
+                    names.push(shared_corner(mesh, face.triangle, face.side, (i, j), k));
                     (primitive.vertices.len() - 1) as u32
                 });
                 (index, uv)
@@ -111,32 +110,27 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
             }
         }
         primitives.push(primitive);
-        at.push(places);
     }
 
-    let all: Vec<Station> = at.concat();
-    let light = solution.at(&all, baked.indirect(1), &baked.shadowing, monitor)?.irradiance;
+    let light = solution.at(&at, baked.indirect(1), &baked.shadowing, monitor)?.irradiance;
     // Vertices at one place of one smooth surface share their mean, so that no seam shows; hidden ones do not count.
-    let mut shared: HashMap<PlaceKey, ([f64; 3], f64)> = HashMap::new();
-    let grid = 4.0 * mesh.tolerance.max(1e-9) + 4e-3 * solution.element_size;
-    let key = |s: &Station| {
-        let cell = ((s.place.point + DVec3::splat(0.37 * grid)) / grid).floor().as_i64vec3().to_array();
-        (cell, (s.place.normal * 24.0).round().as_ivec3().to_array())
-    };
-    for (station, e) in all.iter().zip(&light) {
-        if !is_hidden(solution, station) {
-            let entry = shared.entry(key(station)).or_default();
-            (0..3).for_each(|band| entry.0[band] += f64::from(e[band]));
-            entry.1 += 1.0;
+    let mut shared: HashMap<Shared, ([f64; 3], f64)> = HashMap::new();
+    let hidden: Vec<bool> = at.par_iter().map(|station| is_hidden(solution, station)).collect();
+    for ((name, hidden), e) in names.iter().zip(&hidden).zip(&light) {
+        if let Some(name) = name.filter(|_| !hidden) {
+            let (sum, count) = shared.entry(name).or_default();
+            (0..3).for_each(|band| sum[band] += f64::from(e[band]));
+            *count += 1.0;
         }
     }
-    let mut values = all.iter().zip(&light).map(|(station, e)| match shared.get(&key(station)) {
-        Some((sum, n)) => sum.map(|s| (s / n) as f32),
-        None => *e,
-    });
+    let own = |(i, e): (usize, &Bands)| match names[i].and_then(|name| shared.get(&name)) {
+        Some((sum, n)) => Some(sum.map(|s| (s / n) as f32)),
+        None => (!hidden[i]).then_some(*e),
+    };
+    let mut values = light.iter().enumerate().map(own);
     for primitive in &mut primitives {
         let irradiance = values.by_ref().take(primitive.vertices.len()).collect();
-        primitive.light = Light::Vertex { irradiance };
+        primitive.light = Light::Vertex { irradiance: continued(irradiance, &primitive.triangles) };
     }
 
     let audit = baked.judge(monitor, |station| {
@@ -149,6 +143,30 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
         std::array::from_fn(|band| (0..3).map(|k| corner(k, band)).sum())
     })?;
     Ok(VertexLight { primitives, audit })
+}
+
+/// Values for vertices that have none: the mean of their neighbours', from the nearest on. A vertex inside a solid must
+/// not darken what shows beside it.
+fn continued(mut values: Vec<Option<Bands>>, triangles: &[[u32; 3]]) -> Vec<Bands> {
+    while values.iter().any(Option::is_none) {
+        let mut sums: HashMap<u32, ([f32; 3], f32)> = HashMap::new();
+        for corners in triangles {
+            for &v in corners.iter().filter(|v| values[**v as usize].is_none()) {
+                for e in corners.iter().filter_map(|w| values[*w as usize]) {
+                    let (sum, count) = sums.entry(v).or_default();
+                    (0..3).for_each(|band| sum[band] += e[band]);
+                    *count += 1.0;
+                }
+            }
+        }
+        if sums.is_empty() {
+            break;
+        }
+        for (v, (sum, count)) in sums {
+            values[v as usize] = Some(sum.map(|s| s / count));
+        }
+    }
+    values.into_iter().map(Option::unwrap_or_default).collect()
 }
 
 /// Weights of the corners of a triangle at a point; all are positive inside.

@@ -18,6 +18,9 @@ const WELD: f64 = 1e-6;
 /// auto-smooth angle of modelling programs).
 const CREASE: f64 = 30.0 * std::f64::consts::PI / 180.0;
 
+/// A surface stands on another if they meet at more than this angle (radians; what lies flat on it hides it).
+const STANDING: f64 = 0.02;
+
 /// Corner normals of the author that differ by less than this belong to one smooth surface (radians; 2°: quantised
 /// normals of 8 bits are up to 0.7° off).
 const SAME_NORMAL: f64 = 2.0 * std::f64::consts::PI / 180.0;
@@ -252,8 +255,10 @@ impl Mesh {
                     if !opposite {
                         continue;
                     }
+                    let around = sides.iter().map(|&(r, k)| (r as usize, usize::from(k)));
+                    let separated = sides.len() > 2 && self.is_separated(scene, &normals, (t, i), s, around);
                     for (tc, sc) in [(i, (j + 1) % 3), ((i + 1) % 3, j)] {
-                        if self.is_smooth(scene, &normals, (t, tc), (s, sc)) {
+                        if !separated && self.is_smooth(scene, &normals, (t, tc), (s, sc)) {
                             joined.join(3 * t + tc, 3 * s + sc);
                         }
                     }
@@ -270,6 +275,36 @@ impl Mesh {
             })
             .collect();
         self.smooth_count = number.len();
+    }
+
+    /// Whether a surface stands on the edge `i` of triangle `t` between it and its neighbour `s`, where both are lit: a
+    /// wall without thickness on a floor that goes on behind it.
+    fn is_separated(
+        &self,
+        scene: &Scene,
+        normals: &[DVec3],
+        (t, i): (usize, usize),
+        s: usize,
+        around: impl Iterator<Item = (usize, usize)>,
+    ) -> bool {
+        let corners = self.corners(t);
+        let along = (corners[(i + 1) % 3] - corners[i]).normalize_or_zero();
+        let (up, into) = (normals[t], normals[t].cross(along));
+        // Angle about the edge from t, through the half space that its front looks into.
+        let angle = |triangle: usize, edge: usize| {
+            let away = self.corners(triangle)[(edge + 2) % 3] - corners[i];
+            let angle = away.dot(up).atan2(away.dot(into));
+            if angle < 0.0 { angle + std::f64::consts::TAU } else { angle }
+        };
+        let around: Vec<(usize, f64)> = around.map(|(r, k)| (r, angle(r, k))).collect();
+        let to_neighbour = around.iter().find(|(r, _)| *r == s).map_or(std::f64::consts::PI, |(_, angle)| *angle);
+        let double_sided = |r: usize| scene.material(self.source[r] as usize).double_sided;
+        let both_sides = double_sided(t) && double_sided(s);
+        around.iter().filter(|(r, _)| *r != t && *r != s).any(|(_, angle)| {
+            let in_front = *angle > STANDING && *angle < to_neighbour - STANDING;
+            let behind = *angle > to_neighbour + STANDING && *angle < std::f64::consts::TAU - STANDING;
+            in_front || (both_sides && behind)
+        })
     }
 
     /// Whether light is continuous from a corner of one triangle to the corner of its neighbour at the same vertex.
@@ -369,6 +404,19 @@ mod tests {
         assert_eq!(mesh.vertices.len(), 6);
         assert_eq!(mesh.smooth_count, 6);
         assert!(!mesh.is_split());
+    }
+
+    /// A wall without thickness breaks the light of the floor that goes on behind it; one below the floor does not.
+    #[test]
+    fn a_wall_on_an_edge_breaks_the_light() {
+        for (top, expected) in [(1.0, 10), (-1.0, 8)] {
+            let mut scene = Scene::default();
+            quad(&mut scene, [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]);
+            quad(&mut scene, [[1., 0., 0.], [2., 0., 0.], [2., 1., 0.], [1., 1., 0.]]);
+            quad(&mut scene, [[1., 0., 0.], [1., 1., 0.], [1., 1., top], [1., 0., top]]);
+            // The wall has four smooth vertices of its own.
+            assert_eq!(Mesh::new(&scene).smooth_count, expected + 2);
+        }
     }
 
     #[test]

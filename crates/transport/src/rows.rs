@@ -329,3 +329,67 @@ impl Transport for HitTable {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ElementReceivers, Exposure};
+    use glam::DVec3;
+    use radiosity_scene::{Material, Mesh, Scene};
+
+    /// The inside of a box 1 × 2 × 10, its faces in pairs of opposite ones; the number of each element's face.
+    fn box_of_faces(columns: usize) -> (HitTable, Vec<usize>) {
+        let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
+        let p = |x: f64, y: f64, z: f64| DVec3::new(x, 2.0 * y, 10.0 * z);
+        for (name, corners) in [
+            ("west", [p(0., 0., 0.), p(0., 1., 0.), p(0., 1., 1.), p(0., 0., 1.)]),
+            ("east", [p(1., 0., 0.), p(1., 0., 1.), p(1., 1., 1.), p(1., 1., 0.)]),
+            ("south", [p(0., 0., 0.), p(0., 0., 1.), p(1., 0., 1.), p(1., 0., 0.)]),
+            ("north", [p(0., 1., 0.), p(1., 1., 0.), p(1., 1., 1.), p(0., 1., 1.)]),
+            ("floor", [p(0., 0., 0.), p(1., 0., 0.), p(1., 1., 0.), p(0., 1., 0.)]),
+            ("ceiling", [p(0., 0., 1.), p(0., 1., 1.), p(1., 1., 1.), p(1., 0., 1.)]),
+        ] {
+            scene.add_quad(name, 0, corners);
+        }
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let elements = Elements::new(&scene, &mesh, 0.5);
+        let area = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+        let ids = IdSpace { elements: &elements, sky: SkyPatches::new(&scene.sky, scene.up.direction()) };
+        let mut table = HitTable::new(area, &ids);
+        let exposure = Exposure::default();
+        let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+        table.extend(&tracer, &ids, &receivers, columns, &()).unwrap();
+        let face = |e: u32| scene.triangle_object[mesh.source[elements.place(e).0] as usize] as usize;
+        (table, (0..elements.len() as u32).map(face).collect())
+    }
+
+    /// Catalogue 8: A_i F_ij = A_j F_ji between faces of areas 1 : 10, each direction found by rays of its own; and the
+    /// factors are the known ones (Howell, C-11, of the opposite faces 2 × 10 that are 1 apart: 0.573376).
+    #[test]
+    fn catalogue_8_reciprocity_between_unequal_faces() {
+        let (table, face) = box_of_faces(512);
+        let mut flow = [[0f64; 6]; 6];
+        for (i, &from) in face.iter().enumerate() {
+            for id in table.row_ids(i) {
+                flow[from][face[id as usize]] += table.space.area[i] / 512.0;
+            }
+        }
+        for (i, row) in flow.iter().enumerate() {
+            for (j, there) in row.iter().enumerate() {
+                let back = flow[j][i];
+                assert!((there - back).abs() < 0.01 * there.max(back) + 1e-3, "{i} {j}: {there} {back}");
+            }
+        }
+        let opposite = flow[0][1] / 20.0;
+        assert!((opposite / 0.573_376 - 1.0).abs() < 0.005, "{opposite}");
+    }
+
+    /// Catalogue 0b, 35: every row sums to one, before any repair.
+    #[test]
+    fn catalogue_35_rows_sum_to_one() {
+        let (table, _) = box_of_faces(64);
+        let ones = vec![[1f32; 4]; table.all_ids];
+        assert!(table.rows_mean(&ones).iter().all(|sum| sum[0] == 1.0));
+    }
+}

@@ -11,5 +11,5 @@ pub mod referee;
 
 pub use audit::{Audit, Auditor};
 pub use picture::{Picture, ViewRays};
-pub use reconstruct::Field;
+pub use reconstruct::{Field, Shared, shared_corner};
 pub use referee::Referee;

@@ -20,9 +20,9 @@ pub struct Field {
     values: Vec<Bands>,
 }
 
-/// What corners of several triangles share.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Shared {
+/// What corners of cells of several triangles share where light is continuous.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Shared {
     /// A smooth vertex.
     Vertex(u32, Side),
     /// Place `1..=k−1` of `k` along the edge between two smooth vertices, the lower number first.
@@ -301,8 +301,9 @@ fn edge_key(mesh: &Mesh, t: usize, edge: usize) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// What a lattice corner on the border of a triangle is called by all triangles that share it.
-fn shared_corner(mesh: &Mesh, t: usize, side: Side, (i, j): (u32, u32), k: u32) -> Option<Shared> {
+/// What corner (i, j) of the k × k cells on a triangle's side is called by all triangles that share it; nothing where it
+/// lies inside.
+pub fn shared_corner(mesh: &Mesh, t: usize, side: Side, (i, j): (u32, u32), k: u32) -> Option<Shared> {
     let smooth = mesh.smooth[t];
     match (i, j) {
         (0, 0) => return Some(Shared::Vertex(smooth[0], side)),
