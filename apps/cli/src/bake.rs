@@ -5,12 +5,12 @@ use crate::input::{self, PictureArguments, SceneArguments, SolveArguments};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::report::{LightmapReport, Report};
-use crate::views::{self, View};
+use crate::views;
 use crate::{Failure, Global, numbers};
 use clap::{Args, ValueEnum};
 use radiosity::io::gltf_out::{Encoding, Style, lit_glb};
 use radiosity::io::image_out::encode_exr;
-use radiosity::{Mesh, Tracer};
+use radiosity::{Mesh, RenderOptions, Tracer, View};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
@@ -81,8 +81,10 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");
     let wants_view = arguments.image.is_some() || !arguments.report.is_empty() || arguments.unlit;
-    let size = views::picture_size(&camera, arguments.picture.size);
-    let view = if wants_view { Some(View::new(&baked, &camera, size, progress)?) } else { None };
+    let (width, height) = views::picture_size(&camera, arguments.picture.size);
+    let options = RenderOptions { width, height, ..RenderOptions::default() };
+    let look = || radiosity::render(&baked.solution, &baked.field, &camera, &options, progress);
+    let view = wants_view.then(look).transpose()?;
     let exposure = arguments.picture.exposure.or(view.as_ref().map(|v| v.picture.exposure())).unwrap_or(0.0);
     let mut written: Vec<&Path> = Vec::new();
     if let (Some(path), Some(view)) = (&arguments.image, &view) {
@@ -147,7 +149,7 @@ fn page_path(target: &Path, page: usize) -> PathBuf {
 
 /// The pictures of a page.
 fn plates(view: Option<&View>, camera: &str, report: &Report, exposure: f64) -> Result<Vec<Plate>, Failure> {
-    let Some(view) = view.map(View::for_page) else { return Ok(Vec::new()) };
+    let Some(view) = view.map(views::for_page) else { return Ok(Vec::new()) };
     let ev = format!("{exposure:+.1}").replace('-', "−");
     let from = if camera.is_empty() { String::new() } else { format!(" Camera “{camera}”.") };
     let mut plates = vec![Plate {
@@ -160,7 +162,7 @@ fn plates(view: Option<&View>, camera: &str, report: &Report, exposure: f64) -> 
         plates.push(Plate {
             title: "Illuminance".to_owned(),
             note: "Light that arrives on each surface, lx; so a lamp itself may look dark.".to_owned(),
-            png: view.false_colors(&report.illuminance)?,
+            png: views::false_colors(&view, &report.illuminance)?,
             has_scale: true,
         });
     }
@@ -181,11 +183,23 @@ fn tell(report: &Report, global: &Global, progress: &Progress) -> Result<(), Fai
         return print(&serde_json::to_string(&event).map_err(Failure::work)?);
     }
     progress.say(&report.error.line());
+    if let Some(map) = report.lightmap.as_ref().filter(|map| map.reduced_charts > 0) {
+        progress.say(&format!(
+            "warning: {} charts do not fit on a page at {} texels per metre and got fewer; --max-atlas allows larger pages",
+            map.reduced_charts, map.density
+        ));
+    }
     let (solution, light) = (&report.solution, &report.illuminance);
     let memory = report.peak_memory_mb.map_or(String::new(), |mb| format!(", {mb:.0} MB"));
     progress.say(&format!(
-        "{} elements x {} rays, {:.1} s{memory}; illuminance {:.4} / {:.4} / {:.4} lx (min / mean / max)",
-        solution.elements, solution.rays_per_element, report.time.seconds, light.least, light.mean, light.largest,
+        "{} elements in {} cells x {} rays, {:.1} s{memory}; illuminance {:.4} / {:.4} / {:.4} lx (min / mean / max)",
+        solution.elements,
+        solution.cells,
+        solution.rays_per_cell,
+        report.time.seconds,
+        light.least,
+        light.mean,
+        light.largest,
     ));
     for output in &report.outputs {
         progress.say(&format!("wrote {output}"));

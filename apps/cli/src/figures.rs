@@ -31,7 +31,8 @@ pub const BOUND: &str =
     "lm/m²; no element's radiosity is farther from the exact solution of the discrete equation, by ‖r‖∞/(1 − ρ max)";
 pub const STEPS: &str = "times that light was passed on between all elements";
 pub const ELEMENTS: &str = "pieces that the surfaces were cut into";
-pub const RAYS: &str = "from each element, to find what it sees";
+pub const RAYS: &str =
+    "from each cell, to find what it sees; where direct light varies, a cell is several elements, which share them";
 pub const BURIED: &str = "elements inside solids, which take no part in the light";
 
 pub const SECONDS: &str = "wall clock, from start to the writing of files";

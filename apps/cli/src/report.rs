@@ -2,10 +2,9 @@
 
 use crate::illuminance::Illuminance;
 use crate::progress::Progress;
-use crate::views::View;
 use crate::{figures, input};
 use radiosity::measure::Round;
-use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Mesh};
+use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Mesh, View};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -127,6 +126,12 @@ impl ErrorReport {
             upper if upper.is_finite() => format!("at most {} with 95 % confidence", percent(upper)),
             _ => "without a bound, since the audit had too few points".to_owned(),
         };
+        if self.points > 0 && self.estimated.is_infinite() {
+            let asked = percent(self.asked);
+            return format!(
+                "error asked {asked}: NOT reached; the audit finds no light at all, but the answer has some"
+            );
+        }
         let mut line =
             format!("error asked {}: {verdict}; audit says {}, {bound}", percent(self.asked), percent(self.estimated));
         if self.is_lost_in_writing() {
@@ -148,8 +153,10 @@ pub struct SolutionReport {
     pub buried: usize,
     /// Elements that lie inside solids in part.
     pub partly_buried: usize,
-    /// Rays per element.
-    pub rays_per_element: usize,
+    /// Cells that triangles were cut into; where direct light varies, a cell is several elements.
+    pub cells: usize,
+    /// Rays per cell; the elements of a divided cell share them.
+    pub rays_per_cell: usize,
     /// Largest difference of a row sum from one, before any repair.
     pub raw_closure: f64,
     /// Applications of the transport in the last solve.
@@ -185,6 +192,8 @@ pub struct StageReport {
 pub struct LightmapReport {
     /// Texels per metre.
     pub density: f64,
+    /// Charts too large for a page, which got fewer.
+    pub reduced_charts: usize,
     /// Texels computed.
     pub texels: usize,
     /// Pages, width and height.
@@ -200,6 +209,7 @@ impl LightmapReport {
     pub fn new(map: &Lightmap) -> LightmapReport {
         LightmapReport {
             density: map.density,
+            reduced_charts: map.reduced,
             texels: map.texels,
             pages: map.pages.clone(),
             seams_before: map.seams[0],
@@ -253,7 +263,8 @@ impl Report {
                 element_size: solution.element_size,
                 buried: solution.exposure.buried,
                 partly_buried: solution.exposure.partial,
-                rays_per_element: solution.rays(),
+                cells: solution.elements.cells(),
+                rays_per_cell: solution.rays(),
                 raw_closure,
                 steps: solution.info.steps,
                 relative_residual: solution.info.residual.clone(),

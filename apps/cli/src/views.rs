@@ -3,10 +3,8 @@
 
 use crate::Failure;
 use crate::illuminance::Illuminance;
-use crate::progress::Progress;
 use radiosity::io::image_out::{encode_exr, encode_png};
-use radiosity::view::ViewRays;
-use radiosity::{Baked, Camera, Indirect, Monitor, Picture, RenderOptions, Scene, Tracer, answer, luminance};
+use radiosity::{Camera, Picture, Scene, Tracer, View};
 use std::path::Path;
 
 /// Pictures in a report are made smaller than this, pixels: a page should open at once, and screens show no more.
@@ -15,63 +13,32 @@ const PAGE_SIDE: u32 = 2048;
 /// Pixels without a surface in a false-colour picture: a grey that is none of the scale's colours.
 const VOID: [u8; 3] = [118, 122, 128];
 
-/// What a camera sees of a solution.
-pub struct View {
-    /// Luminances.
-    pub picture: Picture,
-    /// Illuminance of the surface that fills most of each pixel, lux; not a number where there is none.
-    pub illuminance: Vec<f32>,
+/// The view for a page: as it is, or every n-th pixel's block as one.
+pub fn for_page(view: &View) -> View {
+    let picture = &view.picture;
+    let n = picture.width.max(picture.height).div_ceil(PAGE_SIDE).max(1);
+    let (width, height) = (picture.width / n, picture.height / n);
+    if n == 1 || width == 0 || height == 0 {
+        return View { picture: picture.clone(), illuminance: view.illuminance.clone() };
+    }
+    let mut small = Picture { width, height, pixels: Vec::new(), surfaces: Vec::new() };
+    let mut illuminance = Vec::new();
+    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+        let block = (0..n * n).map(|i| ((y * n + i / n) * picture.width + x * n + i % n) as usize);
+        let mut mean = [0f32; 3];
+        block.clone().for_each(|i| (0..3).for_each(|band| mean[band] += picture.pixels[i][band] / (n * n) as f32));
+        small.pixels.push(mean);
+        small.surfaces.push(block.clone().any(|i| picture.surfaces[i]));
+        illuminance.extend(block.clone().map(|i| view.illuminance[i]).nth((n * n / 2) as usize));
+    }
+    View { picture: small, illuminance }
 }
 
-impl View {
-    /// Looks: as [`radiosity::render()`], but keeps the irradiance.
-    pub fn new(baked: &Baked, camera: &Camera, size: (u32, u32), progress: &Progress) -> Result<View, Failure> {
-        progress.stage("picture");
-        let rays = ViewRays::new(baked.solution.tracer(), camera, size.0, size.1);
-        let station =
-            |seen: &radiosity::view::picture::Seen| answer::Station { place: seen.place, uv: seen.uv, side: seen.side };
-        let stations: Vec<answer::Station> = rays.seen.iter().map(station).collect();
-        let shadowing = RenderOptions::default().shadowing;
-        let irradiance = baked.solution.at(&stations, Indirect::Field(&baked.field), &shadowing, progress)?.irradiance;
-
-        let mut illuminance = vec![f32::NAN; rays.own.len()];
-        let mut share = vec![-1f32; rays.own.len()];
-        for (seen, e) in rays.seen.iter().zip(&irradiance) {
-            let (pixel, response) = (seen.pixel as usize, luminance(seen.response));
-            if response > share[pixel] {
-                (share[pixel], illuminance[pixel]) = (response, luminance(*e));
-            }
-        }
-        Ok(View { picture: rays.picture(&irradiance), illuminance })
-    }
-
-    /// The view for a page: as it is, or every n-th pixel's block as one.
-    pub fn for_page(&self) -> View {
-        let picture = &self.picture;
-        let n = picture.width.max(picture.height).div_ceil(PAGE_SIDE).max(1);
-        let (width, height) = (picture.width / n, picture.height / n);
-        if n == 1 || width == 0 || height == 0 {
-            return View { picture: picture.clone(), illuminance: self.illuminance.clone() };
-        }
-        let mut small = Picture { width, height, pixels: Vec::new(), surfaces: Vec::new() };
-        let mut illuminance = Vec::new();
-        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-            let block = (0..n * n).map(|i| ((y * n + i / n) * picture.width + x * n + i % n) as usize);
-            let mut mean = [0f32; 3];
-            block.clone().for_each(|i| (0..3).for_each(|band| mean[band] += picture.pixels[i][band] / (n * n) as f32));
-            small.pixels.push(mean);
-            small.surfaces.push(block.clone().any(|i| picture.surfaces[i]));
-            illuminance.extend(block.clone().map(|i| self.illuminance[i]).nth((n * n / 2) as usize));
-        }
-        View { picture: small, illuminance }
-    }
-
-    /// Illuminance in the colours of its classes, PNG.
-    pub fn false_colors(&self, scale: &Illuminance) -> Result<Vec<u8>, Failure> {
-        let color = |lux: &f32| scale.class(f64::from(*lux)).map_or(VOID, |class| scale.classes[class].color);
-        let pixels: Vec<[u8; 3]> = self.illuminance.iter().map(color).collect();
-        encode_png(self.picture.width, self.picture.height, &pixels).map_err(Failure::work)
-    }
+/// Illuminance in the colours of its classes, PNG.
+pub fn false_colors(view: &View, scale: &Illuminance) -> Result<Vec<u8>, Failure> {
+    let color = |lux: &f32| scale.class(f64::from(*lux)).map_or(VOID, |class| scale.classes[class].color);
+    let pixels: Vec<[u8; 3]> = view.illuminance.iter().map(color).collect();
+    encode_png(view.picture.width, view.picture.height, &pixels).map_err(Failure::work)
 }
 
 /// Tone-mapped PNG bytes.

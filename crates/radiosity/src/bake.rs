@@ -46,8 +46,10 @@ pub struct Baked<'a> {
     pub gather: usize,
     /// Shadow rays that points are lit with.
     pub shadowing: Shadowing,
-    /// What the referee says.
+    /// What the referee says of light that is read as `gather` tells.
     pub audit: Audit,
+    /// What it says of the field alone, which pictures are taken from.
+    pub field_audit: Audit,
     /// Whether the audit's upper bound meets the asked error.
     pub achieved: bool,
     /// The rounds.
@@ -79,7 +81,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     loop {
         let field = solution.indirect_field();
         let answer = solution.at(&watched, Indirect::Field(&field), &shadowing, monitor)?;
-        let mut audit = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
+        let field_audit = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
+        let mut audit = field_audit.clone();
         let mut gather = 0;
         if audit.upper > options.error {
             // The field knows neither contacts below the size of its elements nor normals that are not the faces':
@@ -102,16 +105,17 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         });
         monitor.note(&format!("error {:.2} %, at most {:.2} %", 100.0 * audit.error, 100.0 * audit.upper));
         let achieved = audit.upper <= options.error;
-        // More rounds only while there is something to gain and memory to gain it with.
+        // More rounds only while there is something to gain, and memory and leave to gain it with.
         let smaller = solution.element_size / std::f64::consts::SQRT_2;
         let noisy = solution.row_noise() / SMOOTHING > 0.5 * options.error;
+        let is_given = options.solve.element_size.is_some();
         let next = SolveOptions {
             rays: if noisy { 2 * solution.rays() } else { solution.rays() },
             element_size: Some(if noisy { solution.element_size } else { smaller }),
             ..solve
         };
         let fits = Solution::memory(tracer, &next) <= next.memory;
-        if achieved || rounds.len() > options.rounds || !fits {
+        if achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) {
             stages.absorb(&solution.stages);
             return Ok(Baked {
                 solution,
@@ -119,6 +123,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 gather,
                 shadowing,
                 audit,
+                field_audit,
                 achieved,
                 rounds,
                 stages,

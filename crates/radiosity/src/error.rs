@@ -17,7 +17,7 @@ pub enum Error {
     Memory {
         /// Elements asked for.
         elements: usize,
-        /// Rays per element.
+        /// Rays per cell.
         rays: usize,
         /// Megabytes needed.
         needed: usize,

@@ -34,7 +34,7 @@ pub use error::Error;
 pub use lightmap::{Lightmap, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};
 pub use monitor::{Monitor, Stages};
-pub use render::{RenderOptions, place_camera, render};
+pub use render::{RenderOptions, View, place_camera, render};
 pub use solution::{Balance, Solution, SolveOptions};
 pub use vertex_light::{VertexLight, vertex_light};
 

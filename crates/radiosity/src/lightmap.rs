@@ -26,6 +26,8 @@ pub struct Lightmap {
     pub primitives: Vec<LitPrimitive>,
     /// Texels per metre.
     pub density: f64,
+    /// Charts that did not fit on a page and got fewer.
+    pub reduced: usize,
     /// Texels that were computed.
     pub texels: usize,
     /// What the referee says of the texels as a viewer reads them, before they are stored in 8 bits.
@@ -66,6 +68,9 @@ const EDGE_ROUNDS: usize = 4;
 /// Fewest shadow rays at each of these points.
 const LEAST_RAYS: u32 = 8;
 
+/// Memory that a texel takes while it is worked out, about.
+const TEXEL_BYTES: usize = 400;
+
 /// Texels that the program spends where no density is asked for.
 const AUTOMATIC_TEXELS: f64 = 200_000.0;
 
@@ -94,6 +99,11 @@ pub fn lightmap(
     let charts = Charts::new(&input, &params)?;
     params.texels_per_metre =
         texels_per_metre.or_else(|| charts.density_for(AUTOMATIC_TEXELS)).unwrap_or(params.texels_per_metre);
+    let texels = charts.texel_count(params.texels_per_metre);
+    let most = (solution.memory_allowed() / TEXEL_BYTES) as f64;
+    if texels > most {
+        return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
+    }
     let atlas = charts.pack(&params)?;
 
     // Every texel is lit like a point of the surface; those inside solids are left to their neighbours.
@@ -184,6 +194,7 @@ pub fn lightmap(
         irradiance,
         primitives,
         density: params.texels_per_metre,
+        reduced: atlas.reduced,
         texels: count,
         audit,
         seams: [fitted.before, fitted.after],

@@ -45,11 +45,11 @@ const LEAST_WATCHED: usize = 64;
 pub struct Round {
     /// Elements.
     pub elements: usize,
-    /// Rays per element.
+    /// Rays per cell; the elements of a divided cell share them.
     pub rays: usize,
     /// Gather rays per point; zero where the field was interpolated.
     pub gather: usize,
-    /// Shadow rays per light in penumbrae.
+    /// Shadow rays at each point, over all lights.
     pub shadow_rays: u32,
     /// Estimated error.
     pub error: f64,
@@ -130,7 +130,13 @@ pub fn measure(
             seconds: start.elapsed().as_secs_f64(),
         });
         let achieved = audit.upper <= options.error;
-        if achieved || rounds.len() > options.rounds || places.is_empty() {
+        // Rays alone did not do twice: smaller elements as well.
+        let smaller = (rounds.len() % 2 == 0 && options.solve.element_size.is_none())
+            .then_some(solution.element_size / std::f64::consts::SQRT_2);
+        let size = Some(smaller.unwrap_or(solution.element_size));
+        let next = SolveOptions { element_size: size, rays: 2 * solution.rays(), ..solve };
+        let fits = Solution::memory(tracer, &next) <= next.memory;
+        if achieved || rounds.len() > options.rounds || places.is_empty() || !fits {
             stages.absorb(&solution.stages);
             return Ok(Measurement {
                 irradiance: answer.irradiance,
@@ -144,15 +150,12 @@ pub fn measure(
         }
         gather *= 2;
         shadowing.rays *= 2;
-        let rays = 2 * solution.rays();
-        let smaller = solution.element_size / std::f64::consts::SQRT_2;
-        if rounds.len() % 2 == 0 && options.solve.element_size.is_none() {
-            // Rays alone did not do: smaller elements as well.
-            let finer = SolveOptions { element_size: Some(smaller), rays, ..solve };
+        if smaller.is_some() {
             stages.absorb(&solution.stages);
-            solution = Solution::new(tracer, &finer, monitor)?;
+            drop(solution);
+            solution = Solution::new(tracer, &next, monitor)?;
         } else {
-            solution.refine(rays, monitor)?;
+            solution.refine(next.rays, monitor)?;
         }
     }
 }

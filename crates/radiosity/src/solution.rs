@@ -113,13 +113,7 @@ impl<'a> Solution<'a> {
         let element_size = element_size(tracer, options);
         let needed = Solution::memory(tracer, options);
         if needed > options.memory {
-            let megabytes = |bytes: usize| bytes.div_ceil(1 << 20);
-            return Err(Error::Memory {
-                elements: Elements::count(scene, mesh, element_size),
-                rays: options.rays,
-                needed: megabytes(needed),
-                allowed: megabytes(options.memory),
-            });
+            return Err(memory_error(Elements::count(scene, mesh, element_size), needed, options));
         }
         let watch = Watch(monitor);
         let elements = stages.time(monitor, "elements", || {
@@ -128,6 +122,10 @@ impl<'a> Solution<'a> {
         let Optics { area, reflectance, exitance } = Optics::new(tracer, &elements);
         let exposure = stages.time(monitor, "exposure", || Exposure::new(tracer, mesh, &elements, &watch))?;
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
+        let needed = needed + elements.len() * luminaires.lights.len() * size_of::<Bands>();
+        if needed > options.memory {
+            return Err(memory_error(elements.len(), needed, options));
+        }
         let sky = SkyPatches::new(&scene.sky, scene.up.direction());
 
         let receivers = ElementReceivers { mesh, elements: &elements, exposure: &exposure };
@@ -164,6 +162,11 @@ impl<'a> Solution<'a> {
         Ok(solution)
     }
 
+    /// Bytes that may be taken for what grows with the accuracy.
+    pub fn memory_allowed(&self) -> usize {
+        self.options.memory
+    }
+
     /// Bytes that the table of hit ids takes with these options.
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
@@ -175,24 +178,19 @@ impl<'a> Solution<'a> {
         self.tracer
     }
 
-    /// M: rays per element.
+    /// M: rays per cell; the elements of a divided cell share them.
     pub fn rays(&self) -> usize {
         self.table.columns()
     }
 
-    /// Appends rays up to `rays` per element and solves again from the solution so far.
+    /// Appends rays up to `rays` per cell and solves again from the solution so far.
     ///
     /// # Errors
     /// As [`Solution::new`].
     pub fn refine(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
         let needed = HitTable::bytes(self.elements.cells(), rays);
         if needed > self.options.memory {
-            return Err(Error::Memory {
-                elements: self.elements.cells(),
-                rays,
-                needed: needed.div_ceil(1 << 20),
-                allowed: self.options.memory.div_ceil(1 << 20),
-            });
+            return Err(memory_error(self.elements.cells(), needed, &SolveOptions { rays, ..self.options }));
         }
         let watch = Watch(monitor);
         let mesh = self.tracer.mesh;
@@ -383,6 +381,12 @@ impl<'a> Solution<'a> {
             sums.map(|s| s.map(|x| x as f32));
         Balance { emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs, defect }
     }
+}
+
+/// What an answer would need that the options do not allow.
+fn memory_error(elements: usize, needed: usize, options: &SolveOptions) -> Error {
+    let megabytes = |bytes: usize| bytes.div_ceil(1 << 20);
+    Error::Memory { elements, rays: options.rays, needed: megabytes(needed), allowed: megabytes(options.memory) }
 }
 
 /// Width of a cell: as asked, or such that the scene's area makes as many as asked.

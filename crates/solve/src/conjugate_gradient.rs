@@ -71,7 +71,7 @@ pub fn conjugate_gradient<T: Transport>(
         }
         rr = next;
         let (own, scale) = (space_norm(space, &r, bands), space_norm(space, e, bands));
-        info.residual = own.iter().zip(scale).map(|(r, s)| ratio(*r, s)).collect();
+        info.residual = own.iter().zip(scale).map(|(r, s)| crate::relative(*r, s)).collect();
     }
 }
 

@@ -84,7 +84,12 @@ fn residual(
     }
     let bands = response.bands();
     let (own, scale) = (space.inner(residual, residual, bands), space.inner(e, e, bands));
-    own.iter().zip(scale).map(|(r, s)| if *r == 0.0 { 0.0 } else { (r / s.max(f64::MIN_POSITIVE)).sqrt() }).collect()
+    own.iter().zip(scale).map(|(r, s)| relative(r.sqrt(), s.sqrt())).collect()
+}
+
+/// The norm of a residual relative to that of the right-hand side; nothing is left of nothing.
+fn relative(residual: f64, scale: f64) -> f64 {
+    if residual == 0.0 { 0.0 } else { residual / scale.max(f64::MIN_POSITIVE) }
 }
 
 /// Shows the caller an iterate and says whether the solver is done with it.

@@ -68,7 +68,7 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// What every light gives to what is seen of a receiver from afar.
+    /// What every light gives to what is seen of a receiver from afar; nothing is kept for points.
     pub fn seen_by_light(&self, receiver: usize) -> &[Bands] {
         &self.seen[receiver * self.lights..][..self.lights]
     }
@@ -141,54 +141,61 @@ impl Luminaires {
         progress: &impl Progress,
     ) -> Result<Columns, Stopped> {
         let (n, lights) = (receivers.len(), self.lights.len());
+        // Points are not looked up by others.
+        let kept = if n > 0 && receivers.near(0).is_some() { lights } else { 0 };
         let mut columns =
-            Columns { lights, seen: vec![[0.0; 3]; n * lights], mean: vec![[0.0; 3]; n], shaded: vec![false; n] };
+            Columns { lights: kept, seen: vec![[0.0; 3]; n * kept], mean: vec![[0.0; 3]; n], shaded: vec![false; n] };
         if lights == 0 {
             return Ok(columns);
         }
         const CHUNK: usize = 64;
         let done = AtomicUsize::new(0);
-        let seen = columns.seen.par_chunks_mut(CHUNK * lights);
-        let chunks = seen.zip(columns.mean.par_chunks_mut(CHUNK)).zip(columns.shaded.par_chunks_mut(CHUNK));
-        chunks.enumerate().try_for_each(|(chunk, ((seen, mean), shaded))| {
-            let mut scratch = self.scratch(RATIO);
-            let mut at: Vec<Place> = Vec::new();
-            let mut lit: Vec<[f64; 3]> = Vec::new();
-            for (k, (seen, mean)) in seen.chunks_exact_mut(lights).zip(mean.iter_mut()).enumerate() {
-                let i = chunk * CHUNK + k;
-                at.clear();
-                lit.clear();
-                self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |_, place, visible| {
-                    at.push(*place);
-                    lit.extend_from_slice(visible);
-                });
-                shaded[k] = scratch.outcomes & !CHANCE != LIT;
-                // Where all is lit or all is dark, what is seen from afar has the light of the whole.
-                let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
-                let near = receivers.near(i).filter(|_| mixed || lights > shadowing.rays as usize);
-                let open: Vec<f64> = match near {
-                    Some(near) => openness(tracer, &at, near, receivers.seed(i)),
-                    None => vec![1.0; at.len()],
-                };
-                let (places, all_open) = (at.len() as f64, open.iter().sum::<f64>());
-                for (l, seen) in seen.iter_mut().enumerate() {
-                    let mut sums = [0f64; 6];
-                    for (visible, open) in lit.chunks_exact(lights).zip(&open) {
+        let mut seen: Vec<&mut [Bands]> = columns.seen.chunks_mut(CHUNK * kept.max(1)).collect();
+        seen.resize_with(n.div_ceil(CHUNK), Default::default);
+        let chunks = seen.into_par_iter().zip(columns.mean.par_chunks_mut(CHUNK));
+        chunks.zip(columns.shaded.par_chunks_mut(CHUNK)).enumerate().try_for_each(
+            |(chunk, ((seen, mean), shaded))| {
+                let mut scratch = self.scratch(RATIO);
+                let mut at: Vec<Place> = Vec::new();
+                let mut lit: Vec<[f64; 3]> = Vec::new();
+                for (k, mean) in mean.iter_mut().enumerate() {
+                    let i = chunk * CHUNK + k;
+                    at.clear();
+                    lit.clear();
+                    self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |_, place, visible| {
+                        at.push(*place);
+                        lit.extend_from_slice(visible);
+                    });
+                    shaded[k] = scratch.outcomes & !CHANCE != LIT;
+                    // Where all is lit or all is dark, what is seen from afar has the light of the whole.
+                    let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
+                    let near = receivers.near(i).filter(|_| mixed || lights > shadowing.rays as usize);
+                    let open: Vec<f64> = match near {
+                        Some(near) => openness(tracer, &at, near, receivers.seed(i)),
+                        None => vec![1.0; at.len()],
+                    };
+                    let (places, all_open) = (at.len() as f64, open.iter().sum::<f64>());
+                    for l in 0..lights {
+                        let mut sums = [0f64; 6];
+                        for (visible, open) in lit.chunks_exact(lights).zip(&open) {
+                            for band in 0..3 {
+                                sums[band] += visible[l][band];
+                                sums[band + 3] += open * visible[l][band];
+                            }
+                        }
                         for band in 0..3 {
-                            sums[band] += visible[l][band];
-                            sums[band + 3] += open * visible[l][band];
+                            let over_area = sums[band] / f64::max(places, 1.0);
+                            mean[band] += over_area as f32;
+                            if let Some(seen) = seen.get_mut(k * kept + l) {
+                                seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
+                            }
                         }
                     }
-                    for band in 0..3 {
-                        let over_area = sums[band] / f64::max(places, 1.0);
-                        mean[band] += over_area as f32;
-                        seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
-                    }
                 }
-            }
-            let so_far = done.fetch_add(mean.len(), Ordering::Relaxed) + mean.len();
-            progress.step(so_far, n).then_some(()).ok_or(Stopped)
-        })?;
+                let so_far = done.fetch_add(mean.len(), Ordering::Relaxed) + mean.len();
+                progress.step(so_far, n).then_some(()).ok_or(Stopped)
+            },
+        )?;
         Ok(columns)
     }
 

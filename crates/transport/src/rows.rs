@@ -255,7 +255,7 @@ impl HitTable {
             .into_par_iter()
             .with_min_len(256)
             .map(|i| {
-                let share = 2.0 / self.traced[i] as f32;
+                let share = 2.0 / self.traced[i].max(1) as f32;
                 self.row(i, values).map(|sum| sum.map(|x| x * share))
             })
             .collect()

@@ -243,15 +243,10 @@ impl Field {
         let i = (x as u32).min(k - 1 - j);
         let (fx, fy) = ((x - f64::from(i)) as f32, (y - f64::from(j)) as f32);
         let value = |i: u32, j: u32| self.values[first + corner(i, j, k)];
-        let inverted = fx + fy > 1.0 && i + j + 2 <= k;
-        let [a, b, c, s, t] = if inverted {
-            let [a, b, c] = [value(i + 1, j + 1), value(i, j + 1), value(i + 1, j)];
-            return combine(a, b, c, 1.0 - fx, 1.0 - fy);
-        } else {
-            let [a, b, c] = [value(i, j), value(i + 1, j), value(i, j + 1)];
-            [a, b, c, [fx; 3], [fy; 3]]
-        };
-        combine(a, b, c, s[0], t[0])
+        if fx + fy > 1.0 && i + j + 2 <= k {
+            return combine(value(i + 1, j + 1), value(i, j + 1), value(i + 1, j), 1.0 - fx, 1.0 - fy);
+        }
+        combine(value(i, j), value(i + 1, j), value(i, j + 1), fx, fy)
     }
 }
 

@@ -78,7 +78,8 @@ fn example(rounds: usize) -> Report {
             element_size: 0.181,
             buried: 120,
             partly_buried: 34,
-            rays_per_element: 2048,
+            cells: 9_000,
+            rays_per_cell: 2048,
             raw_closure: 2.2e-16,
             steps: 14,
             relative_residual: vec![3.1e-6; 3],
@@ -92,6 +93,7 @@ fn example(rounds: usize) -> Report {
         peak_memory_mb: Some(812.0),
         lightmap: Some(LightmapReport {
             density: 16.0,
+            reduced_charts: 0,
             texels: 42_000,
             pages: vec![[1024, 1024], [512, 256]],
             seams_before: 3.4,

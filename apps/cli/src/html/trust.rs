@@ -22,7 +22,7 @@ pub fn convergence(report: &Report) -> String {
             [&[count(i + 1)][..], &found, &with].concat()
         })
         .collect();
-    let head = ["Round", "Estimated error", "Upper bound", "After", "Elements", "Rays each", "Shadow rays"];
+    let head = ["Round", "Estimated error", "Upper bound", "After", "Elements", "Rays per cell", "Shadow rays"];
     let body = match rows.len() {
         0 => "<p>No round was completed.</p>".to_owned(),
         _ => plot::convergence(&report.rounds, report.error.asked) + &table(&head, &rows),
@@ -102,7 +102,7 @@ pub fn solution(report: &Report) -> String {
     let cards = cards(&[
         ("Raw closure", number(s.raw_closure), figures::CLOSURE),
         ("Elements", count(s.elements), &elements),
-        ("Rays", count(s.rays_per_element), figures::RAYS),
+        ("Rays", count(s.rays_per_cell), figures::RAYS),
         ("Steps", count(s.steps), figures::STEPS),
         ("Buried", count(s.buried), &buried),
     ]);

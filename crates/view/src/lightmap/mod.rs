@@ -29,7 +29,6 @@ pub use texels::Texel;
 
 use glam::{DVec2, DVec3, Vec2};
 use pack::{Placement, pack};
-use std::ops::ControlFlow;
 
 /// Triangles to lay out.
 #[derive(Clone, Copy, Debug)]
@@ -105,9 +104,14 @@ pub enum LightmapError {
         /// What is allowed.
         range: &'static str,
     },
-    /// The progress callback asked to stop.
-    #[error("cancelled")]
-    Cancelled,
+    /// More texels than the memory that is allowed can hold.
+    #[error("{texels:.0} texels are asked for and {most:.0} are allowed; ask for fewer per metre or allow more memory")]
+    Texels {
+        /// About how many are asked for.
+        texels: f64,
+        /// How many are allowed.
+        most: f64,
+    },
 }
 
 /// Where every triangle lies on the pages.
@@ -142,25 +146,6 @@ struct Placed {
 
 /// Axes thinner than this many texels read a single row: two rows would cost twice as much and show nothing more.
 const COLLAPSE: f64 = 0.5;
-
-/// Lays the triangles flat and packs them: [`Charts::new`] and [`Charts::pack`] in one.
-///
-/// `progress` is told the share done, 0..1, and may stop the work.
-pub fn unwrap(
-    input: &UnwrapInput,
-    params: &UnwrapParams,
-    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<Atlas, LightmapError> {
-    let charts = Charts::new(input, params)?;
-    if progress(0.5).is_break() {
-        return Err(LightmapError::Cancelled);
-    }
-    let atlas = charts.pack(params)?;
-    match progress(1.0) {
-        ControlFlow::Break(()) => Err(LightmapError::Cancelled),
-        ControlFlow::Continue(()) => Ok(atlas),
-    }
-}
 
 impl UnwrapParams {
     fn check(&self) -> Result<(), LightmapError> {
