@@ -28,8 +28,8 @@ pub enum Error {
     #[error("lightmap: {0}")]
     Lightmap(radiosity_view::lightmap::LightmapError),
     /// A page of a lightmap cannot be encoded.
-    #[error("picture of a lightmap: {0}")]
-    Picture(String),
+    #[error("page of a lightmap: {0}")]
+    Picture(#[from] radiosity_io::image_out::EncodeError),
     /// The scene has nothing to compute.
     #[error("{0}")]
     Empty(&'static str),

@@ -7,13 +7,13 @@ use crate::{Error, Monitor, stations};
 use glam::DVec2;
 use radiosity_io::gltf_out::{Encoding, Light, LitPrimitive, PageImage};
 use radiosity_io::image_out::encode_png;
+use radiosity_scene::display::srgb;
 use radiosity_scene::{Bands, Side};
 use radiosity_transport::Shadowing;
 use radiosity_view::Audit;
 use radiosity_view::lightmap::{
     Charts, LightmapError, SeamParams, Texel, UnwrapInput, UnwrapParams, fill, fit_seams, look_up, shared_edges,
 };
-use radiosity_view::picture::srgb;
 use std::collections::HashMap;
 
 /// A lightmap: pages of linear irradiance, and the primitives that refer to them.
@@ -50,7 +50,7 @@ impl Lightmap {
                 (255.0 * if encoding == Encoding::Srgb { srgb(share) } else { share }).round() as u8
             };
             let pixels: Vec<[u8; 3]> = lux.iter().map(|e| e.map(encode)).collect();
-            Ok(PageImage { png: encode_png(size[0], size[1], &pixels).map_err(Error::Picture)?, intensity })
+            Ok(PageImage { png: encode_png(size[0], size[1], &pixels)?, intensity })
         };
         self.pages.iter().zip(&self.irradiance).map(image).collect()
     }

@@ -100,11 +100,23 @@ pub struct Solution<'a> {
 }
 
 impl<'a> Solution<'a> {
-    /// Cuts the scene into elements, traces their rays and solves.
+    /// Cuts the scene into elements, traces their rays and solves: [`Solution::begin`] and one [`Solution::refine`].
     ///
     /// # Errors
     /// [`Error::Memory`] before anything large is allocated; [`Error::Stopped`]; [`Error::Solve`].
     pub fn new(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
+        let mut solution = Solution::begin(tracer, options, monitor)?;
+        solution.refine(options.rays, monitor)?;
+        Ok(solution)
+    }
+
+    /// The first picture, before any row is traced: elements, their direct light, and for the rest the ambient term
+    /// (Cohen et al. 1988, sect. 4.2), the same indirect irradiance everywhere that keeps the energy. Sky light comes with
+    /// the rows. Call [`Solution::refine`] with ever more rays for ever better answers; each is whole.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] before anything large is allocated; [`Error::Stopped`].
+    pub fn begin(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         if mesh.triangles.is_empty() {
             return Err(Error::Empty("the scene has no surface"));
@@ -158,8 +170,34 @@ impl<'a> Solution<'a> {
             irradiance: vec![[0.0; 3]; n],
             indirect: vec![[0.0; 3]; n],
         };
-        solution.refine(options.rays, monitor)?;
+        solution.spread_ambient();
         Ok(solution)
+    }
+
+    /// H = Σ A B₀/Σ A (1 − ρ) on all elements, B₀ being what they give off without indirect light.
+    fn spread_ambient(&mut self) {
+        let (weight, direct) = (self.exposed_area(), self.direct());
+        let own = |i: usize, band: usize| {
+            let seen = f64::from(self.columns.seen(i)[band]);
+            f64::from(self.exitance[i][band] - self.luminaires.promoted[i][band])
+                + f64::from(self.reflectance[i][band]) * seen
+        };
+        let ambient: Bands = std::array::from_fn(|band| {
+            let (mut given, mut kept) = (0.0, 0.0);
+            for (i, w) in weight.iter().enumerate() {
+                given += w * own(i, band);
+                kept += w * (1.0 - f64::from(self.reflectance[i][band]));
+            }
+            if kept > 0.0 { (given / kept) as f32 } else { 0.0 }
+        });
+        let own: Vec<[f64; 3]> = (0..weight.len()).map(|i| std::array::from_fn(|band| own(i, band))).collect();
+        for i in 0..weight.len() {
+            for band in 0..3 {
+                self.values[i][band] = own[i][band] as f32 + self.reflectance[i][band] * ambient[band];
+                self.indirect[i][band] = ambient[band];
+                self.irradiance[i][band] = direct[i][band] + ambient[band];
+            }
+        }
     }
 
     /// Bytes that may be taken for what grows with the accuracy.

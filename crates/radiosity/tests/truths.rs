@@ -102,6 +102,42 @@ fn catalogue_5_white_furnace() {
     }
 }
 
+/// Catalogue 41: the ambient term is exact in a furnace, and near what the rows then find elsewhere; each doubling of the
+/// rays is a whole answer that comes nearer.
+#[test]
+fn catalogue_41_first_pictures() {
+    let scene = room(DVec3::new(1.0, 2.0, 3.0), matte("glowing", [0.5; 3], [100.0; 3]));
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let first = Solution::begin(&tracer, &SolveOptions::default(), &()).unwrap();
+    assert!(first.irradiance().iter().flatten().all(|h| (h / 200.0 - 1.0).abs() < 1e-5));
+
+    let scene = radiosity::cornell_box();
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let options = SolveOptions { element_size: Some(0.05), ..SolveOptions::default() };
+    let best = Solution::new(&tracer, &SolveOptions { rays: 1024, ..options }, &()).unwrap();
+    let weight = best.exposed_area();
+    let error = |solution: &Solution| {
+        let square = |e: &[f32; 3]| f64::from(luminance(*e)).powi(2);
+        let (mut difference, mut all) = (0.0, 0.0);
+        for ((h, e), w) in solution.irradiance().iter().zip(best.irradiance()).zip(&weight) {
+            difference += w * square(&std::array::from_fn(|band| h[band] - e[band]));
+            all += w * square(e);
+        }
+        (difference / all).sqrt()
+    };
+    let mut solution = Solution::begin(&tracer, &options, &()).unwrap();
+    let mut last = error(&solution);
+    assert!(last < 0.35, "{last}");
+    for rays in [16, 64, 256] {
+        solution.refine(rays, &()).unwrap();
+        let now = error(&solution);
+        assert!(now < 0.7 * last, "{rays}: {now} after {last}");
+        last = now;
+    }
+}
+
 /// Catalogue 6: inside a sphere the irradiance is uniform for any emission; the error of the octahedral sphere used
 /// here falls with its facets.
 #[test]

@@ -5,6 +5,7 @@
 //! into the pieces whose radiosity is one number per band. Nothing in this crate traces a ray or stores a result.
 
 pub mod camera;
+pub mod display;
 pub mod elements;
 pub mod fault;
 pub mod light;

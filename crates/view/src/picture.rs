@@ -5,6 +5,7 @@
 //! smooth at the price of little more than one evaluation per pixel.
 
 use glam::{DVec2, DVec3};
+use radiosity_scene::display::{srgb, tone_map};
 use radiosity_scene::{Bands, Camera, Side, luminance};
 use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
@@ -196,46 +197,9 @@ impl Picture {
 
 const BAYER: [[u8; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
 
-/// Compresses by the largest channel, then lets very bright colours fade to white as film does.
-fn tone_map(color: Bands) -> Bands {
-    const KNEE: f32 = 0.5;
-    const WHITE: f32 = 8.0;
-    let peak = color[0].max(color[1]).max(color[2]);
-    if peak <= KNEE {
-        return color;
-    }
-    // Above the knee: y = knee + (1 − knee) · (1 − e^{−s})/(1 − e^{−S}), with slope one at the knee.
-    let range = 1.0 - KNEE;
-    let end = 1.0 - (-(WHITE - KNEE) / range).exp();
-    let mapped = KNEE + range * (1.0 - (-(peak - KNEE) / range).exp()) / end;
-    let fade = ((peak - 1.0) / (WHITE - 1.0)).clamp(0.0, 1.0);
-    color.map(|c| {
-        let hue = c / peak * mapped;
-        (hue + fade * (mapped - hue)).min(1.0)
-    })
-}
-
-/// sRGB encoding (IEC 61966-2-1) of a linear value in 0..1.
-pub fn srgb(linear: f32) -> f32 {
-    let x = linear.clamp(0.0, 1.0);
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn tone_mapping_is_linear_below_the_knee_and_monotonic_above() {
-        assert_eq!(tone_map([0.2, 0.4, 0.5]), [0.2, 0.4, 0.5]);
-        let mut last = 0.0;
-        for i in 1..2000 {
-            let y = tone_map([i as f32 * 0.01; 3])[1];
-            assert!(y >= last && y <= 1.0, "{i}");
-            last = y;
-        }
-        assert!((tone_map([8.0; 3])[0] - 1.0).abs() < 1e-3);
-    }
 
     #[test]
     fn a_grey_picture_is_exposed_to_middle_grey() {

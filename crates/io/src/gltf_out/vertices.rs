@@ -4,6 +4,7 @@ use super::glb::Builder;
 use super::{Light, LitPrimitive, LitVertex, Style, WriteError, skin};
 use crate::gltf::Document;
 use crate::gltf::json::{list, whole};
+use radiosity_scene::display::tone_map;
 use serde_json::{Map, Value, json};
 
 /// How an attribute behaves between vertices.
@@ -154,26 +155,6 @@ pub(super) struct Glow {
     pub emissive: [f32; 3],
 }
 
-/// Colours end at 1: the curve that pictures are shown with, linear up to one half, then a shoulder that reaches white at
-/// 8 and keeps hues until they fade to white. A plain cut at 1 would show sun and shade alike.
-fn display(color: [f32; 3]) -> [f32; 3] {
-    const KNEE: f32 = 0.5;
-    const WHITE: f32 = 8.0;
-    let color = color.map(|c| if c >= 0.0 { c.min(f32::MAX) } else { 0.0 });
-    let peak = color[0].max(color[1]).max(color[2]);
-    if peak <= KNEE {
-        return color;
-    }
-    let range = 1.0 - KNEE;
-    let end = 1.0 - (-(WHITE - KNEE) / range).exp();
-    let mapped = KNEE + range * (1.0 - (-(peak - KNEE) / range).exp()) / end;
-    let fade = ((peak - 1.0) / (WHITE - 1.0)).clamp(0.0, 1.0);
-    color.map(|c| {
-        let hue = c / peak * mapped;
-        (hue + fade * (mapped - hue)).min(1.0)
-    })
-}
-
 /// Adds the light to the attributes of a primitive; returns the texture coordinate set of its lightmap.
 pub(super) fn add_light(
     builder: &mut Builder,
@@ -206,7 +187,7 @@ pub(super) fn add_light(
                     flat
                 });
                 let own = own.unwrap_or([1.0; 4]);
-                values.extend(display(std::array::from_fn(|band| {
+                values.extend(tone_map(std::array::from_fn(|band| {
                     let reflected = glow.tint[band] * own[band] * e[band] / std::f32::consts::PI;
                     exposure * (reflected + glow.emissive[band])
                 })));
