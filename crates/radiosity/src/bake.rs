@@ -1,7 +1,7 @@
 //! From a scene to a solution whose error is known: refine until the audit is content.
 
 use crate::answer::Station;
-use crate::measure::{Round, certify, most_paths, rays_for};
+use crate::measure::{Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages};
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
 use radiosity_scene::Bands;
@@ -14,6 +14,9 @@ const SMOOTHING: f64 = 2.4;
 
 /// Cells to aim for: 10,000 leave those of a room with a garden 0.4 m wide, and contacts blurred.
 const CELLS: usize = 30_000;
+
+/// How often the rays of a gather are doubled before all is made finer.
+const GATHERS: usize = 3;
 
 /// How to bake.
 #[derive(Clone, Copy, Debug)]
@@ -84,15 +87,20 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let field_audit = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
         let mut audit = field_audit.clone();
         let mut gather = 0;
-        if audit.upper > options.error {
-            // The field knows neither contacts below the size of its elements nor normals that are not the faces':
-            // gathering at each point does, and costs less than elements that small.
-            let rays = rays_for(options.error, 256.0, 32, 2048);
+        // The field knows neither contacts below the size of its elements nor normals that are not the faces': gathering at
+        // each point does, and costs less than elements that small.
+        let mut rays = rays_for(options.error, 256.0, 32, 2048);
+        for _ in 0..GATHERS {
+            if audit.upper <= options.error {
+                break;
+            }
             let answer = solution.at(&watched, Indirect::Gather { rays }, &shadowing, monitor)?;
             let better = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
-            if better.upper < audit.upper {
-                (audit, gather) = (better, rays);
+            if better.upper >= audit.upper {
+                break;
             }
+            (audit, gather) = (better, rays);
+            rays *= 2;
         }
         rounds.push(Round {
             elements: solution.elements.len(),
@@ -115,7 +123,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             ..solve
         };
         let fits = Solution::memory(tracer, &next) <= next.memory;
-        if achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) {
+        if achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) || is_stalled(&rounds) {
             stages.absorb(&solution.stages);
             return Ok(Baked {
                 solution,

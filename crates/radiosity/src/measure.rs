@@ -136,7 +136,7 @@ pub fn measure(
         let size = Some(smaller.unwrap_or(solution.element_size));
         let next = SolveOptions { element_size: size, rays: 2 * solution.rays(), ..solve };
         let fits = Solution::memory(tracer, &next) <= next.memory;
-        if achieved || rounds.len() > options.rounds || places.is_empty() || !fits {
+        if achieved || rounds.len() > options.rounds || places.is_empty() || !fits || is_stalled(&rounds) {
             stages.absorb(&solution.stages);
             return Ok(Measurement {
                 irradiance: answer.irradiance,
@@ -158,6 +158,14 @@ pub fn measure(
             solution.refine(next.rays, monitor)?;
         }
     }
+}
+
+/// A round that leaves more than this part of the error of the one before it is the last: what remains is not noise.
+const STALLED: f64 = 0.9;
+
+/// Whether the last round brought next to nothing.
+pub(crate) fn is_stalled(rounds: &[Round]) -> bool {
+    matches!(rounds, [.., before, last] if last.error > STALLED * before.error)
 }
 
 /// Paths per estimate that an audit spends at most.
