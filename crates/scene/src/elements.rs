@@ -5,7 +5,7 @@
 //! its element. Cells have the size that smooth light needs; d is 1 but where direct light changes within a cell
 //! ([`Elements::refined`]). Double-sided triangles own a second run of cells for their back.
 
-use crate::{Bands, Mesh, Scene, Side};
+use crate::{AlphaMode, Bands, Mesh, Scene, Side, Surface};
 use glam::{DVec2, DVec3};
 use std::ops::Range;
 
@@ -193,9 +193,42 @@ impl Elements {
         mesh.point(self.place(element).0, (a + b + c) / 3.0)
     }
 
-    /// Mean reflectance and emitted exitance (π × luminance, lm/m² per band) of an element. Pictures are averaged
-    /// over 16 points, plain materials take one.
+    /// Mean reflectance and emitted exitance (π × luminance, lm/m² per band) of what of an element stops a ray: places
+    /// count by their opacity, since rays that look the element up have stopped there. Pictures are averaged over 16
+    /// points, plain materials take one.
     pub fn optics(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> (Bands, Bands) {
+        let (mut reflectance, mut exitance, mut opaque) = ([0.0; 3], [0.0; 3], 0.0);
+        self.sample_optics(scene, mesh, element, |at, share| {
+            let weight = share * scene.opacity(at);
+            if weight > 0.0 {
+                let (r, l) = (scene.reflectance(at), scene.emitted_luminance(at));
+                opaque += weight;
+                for band in 0..3 {
+                    reflectance[band] += weight * r[band];
+                    exitance[band] += weight * std::f32::consts::PI * l[band];
+                }
+            }
+        });
+        if opaque > 0.0 {
+            (reflectance.map(|r| r / opaque), exitance.map(|e| e / opaque))
+        } else {
+            (reflectance, exitance)
+        }
+    }
+
+    /// Mean opacity of an element. An area emits its exitance times this.
+    pub fn opacity(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> f32 {
+        let (t, _) = self.place(element);
+        if scene.material(mesh.source[t] as usize).alpha_mode == AlphaMode::Opaque {
+            return 1.0;
+        }
+        let mut opacity = 0.0;
+        self.sample_optics(scene, mesh, element, |at, share| opacity += share * scene.opacity(at));
+        opacity
+    }
+
+    /// Calls back with places all over an element and the share of it that each stands for.
+    fn sample_optics(&self, scene: &Scene, mesh: &Mesh, element: ElementId, mut visit: impl FnMut(Surface, f32)) {
         let (t, _) = self.place(element);
         let material = scene.material(mesh.source[t] as usize);
         let varied = material.base_color_texture.is_some()
@@ -203,19 +236,11 @@ impl Elements {
             || material.emissive_texture.is_some()
             || !scene.colors.is_empty();
         let n = if varied { 4 } else { 1 };
-        let (mut reflectance, mut exitance) = ([0.0; 3], [0.0; 3]);
-        let share = 1.0 / (n * n) as f32;
         for i in 0..n * n {
             let x = ((i % n) as f64 + 0.5) / n as f64;
             let y = ((i / n) as f64 + 0.5) / n as f64;
-            let at = mesh.surface(t, self.sample(element, x, y));
-            let (r, l) = (scene.reflectance(at), scene.emitted_luminance(at));
-            for band in 0..3 {
-                reflectance[band] += share * r[band];
-                exitance[band] += share * std::f32::consts::PI * l[band];
-            }
+            visit(mesh.surface(t, self.sample(element, x, y)), 1.0 / (n * n) as f32);
         }
-        (reflectance, exitance)
     }
 }
 

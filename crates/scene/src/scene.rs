@@ -173,7 +173,8 @@ impl Scene {
         std::array::from_fn(|band| (base[band] * diffuse).clamp(0.0, MAX_REFLECTANCE))
     }
 
-    /// Emitted luminance per band at a point, cd/m².
+    /// Luminance per band that a ray finds which the surface stops at a point, cd/m². Light that is asked of the
+    /// surface without such a ray is [`Scene::opacity`] times this.
     pub fn emitted_luminance(&self, at: Surface) -> Bands {
         let material = self.material(at.triangle);
         match &material.emissive_texture {

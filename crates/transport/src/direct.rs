@@ -612,7 +612,8 @@ fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
 fn emission_at(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
     let uv = tracer.mesh.barycentric(piece.triangle as usize, point).clamp(DVec2::ZERO, DVec2::ONE);
     let at = tracer.mesh.surface(piece.triangle as usize, uv);
-    tracer.scene.emitted_luminance(at).map(|l| l * std::f32::consts::PI)
+    let opacity = tracer.scene.opacity(at);
+    tracer.scene.emitted_luminance(at).map(|l| opacity * l * std::f32::consts::PI)
 }
 
 #[cfg(test)]

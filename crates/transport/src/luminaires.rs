@@ -2,7 +2,8 @@
 //! through rows of rays, which would find them too seldom.
 
 use glam::DVec3;
-use radiosity_scene::{Bands, Elements, Mesh, PointLight, Scene, Side, luminance};
+use radiosity_scene::{AlphaMode, Bands, Elements, Mesh, PointLight, Scene, Side, luminance};
+use rayon::prelude::*;
 
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
 /// nothing extra: its noise there is no more than that of ordinary reflected light.
@@ -19,11 +20,11 @@ pub struct Piece {
     pub corners: [DVec3; 3],
     /// Unit normal of the emitting side.
     pub normal: DVec3,
-    /// Mean exitance π L, lm/m² per band.
+    /// Mean exitance, lm/m² per band: π L times the opacity.
     pub exitance: Bands,
     /// Area, m².
     pub area: f64,
-    /// Whether the emission varies over the triangle.
+    /// Whether the emission or the opacity varies over the triangle.
     pub varied: bool,
 }
 
@@ -69,10 +70,16 @@ pub struct Luminaires {
 }
 
 impl Luminaires {
-    /// Collects the scene's lights. `exitance` has the exitance of each element per band.
+    /// Collects the scene's lights. `exitance` has the exitance of each element per band where it is opaque, as
+    /// [`Elements::optics`] gives it.
     pub fn new(scene: &Scene, mesh: &Mesh, elements: &Elements, area: &[f64], exitance: &[Bands]) -> Luminaires {
         let total_area: f64 = area.iter().sum();
-        let power: f64 = area.iter().zip(exitance).map(|(a, e)| a * f64::from(luminance(*e))).sum();
+        let opacity: Vec<f32> =
+            (0..elements.len() as u32).into_par_iter().map(|e| elements.opacity(scene, mesh, e)).collect();
+        // What an element emits is seen by rays that it stops and by samples of it alike: its exitance times opacity.
+        let given = |e: usize, band: usize| f64::from(opacity[e]) * area[e] * f64::from(exitance[e][band]);
+        let power: f64 =
+            (0..elements.len()).map(|e| f64::from(opacity[e]) * area[e] * f64::from(luminance(exitance[e]))).sum();
         let bright = BRIGHT * power / total_area.max(f64::MIN_POSITIVE);
 
         // Mean exitance of each triangle's sides from those of its elements.
@@ -90,9 +97,8 @@ impl Luminaires {
                     continue;
                 }
                 let whole: f64 = own.iter().map(|&e| area[e]).sum();
-                let mean: Bands = std::array::from_fn(|band| {
-                    (own.iter().map(|&e| area[e] * f64::from(exitance[e][band])).sum::<f64>() / whole) as f32
-                });
+                let mean: Bands =
+                    std::array::from_fn(|band| (own.iter().map(|&e| given(e, band)).sum::<f64>() / whole) as f32);
                 let [a, b, c] = mesh.corners(triangle);
                 let front = side == Side::Front;
                 let source = mesh.source[triangle] as usize;
@@ -105,7 +111,7 @@ impl Luminaires {
                         normal: if front { mesh.normal(triangle) } else { -mesh.normal(triangle) },
                         exitance: mean,
                         area: mesh.area(triangle),
-                        varied: scene.material(source).emissive_texture.is_some(),
+                        varied: varied(scene, source),
                     },
                 ));
                 for e in own {
@@ -144,4 +150,12 @@ impl Luminaires {
         lights.extend(scene.lights.iter().cloned().map(Light::Point));
         Luminaires { lights, promoted }
     }
+}
+
+/// Whether what a triangle gives varies over it.
+fn varied(scene: &Scene, triangle: usize) -> bool {
+    let material = scene.material(triangle);
+    let see_through = material.alpha_mode != AlphaMode::Opaque;
+    material.emissive_texture.is_some()
+        || see_through && (material.base_color_texture.is_some() || !scene.colors.is_empty())
 }

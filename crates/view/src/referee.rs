@@ -174,9 +174,11 @@ impl<'a> Referee<'a> {
                 let target = Place { point, normal: emitter.normal, triangle: emitter.triangle };
                 if self.tracer.mutually_visible(place, &target, random.next_bits()) {
                     let weight = balance(density, cosine / PI);
-                    let luminance = self.tracer.scene.emitted_luminance(mesh.surface(emitter.triangle as usize, uv));
-                    for (sum, l) in sum.iter_mut().zip(luminance) {
-                        *sum += weight * f64::from(l) * cosine / density;
+                    let (scene, at) = (self.tracer.scene, mesh.surface(emitter.triangle as usize, uv));
+                    // Rays stop at a place in proportion to its opacity; a sample of it must be told.
+                    let opacity = f64::from(scene.opacity(at));
+                    for (sum, l) in sum.iter_mut().zip(scene.emitted_luminance(at)) {
+                        *sum += weight * opacity * f64::from(l) * cosine / density;
                     }
                 }
             }
