@@ -1,7 +1,11 @@
 //! What gives light: surfaces that are partly there, lamps with pictures, the sun of a sky.
 
-use glam::DVec3;
-use radiosity::{AlphaMode, Material, Mesh, Place, Referee, Scene, Solution, SolveOptions, Tracer, Up};
+use glam::{DAffine2, DVec3, Vec2};
+use radiosity::transport::PointReceivers;
+use radiosity::{
+    AlphaMode, Elements, Material, Mesh, Place, Referee, Scene, Side, Solution, SolveOptions, Texture, TextureRef,
+    Tracer, Up, Wrap,
+};
 
 /// A square about the vertical axis at a height, facing up or down.
 fn square(half: f64, z: f64, up: bool) -> [DVec3; 4] {
@@ -70,4 +74,47 @@ fn surfaces_give_light_as_far_as_they_are_there() {
             assert_eq!(part[unused], 0.0);
         }
     }
+}
+
+/// Where the samples of an element met dark texels only, near rays of a gather added what the lamp gave already.
+#[test]
+fn lamps_with_pictures_are_counted_once() {
+    const SIZE: u32 = 1024;
+    const ELEMENT: f64 = 0.4;
+    let picture = TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap: [Wrap::Clamp; 2] };
+    let lamp = Material { emissive_texture: Some(picture), ..black(1000.0) };
+    let texels = vec![[255; 4]; (SIZE * SIZE) as usize];
+    let bright = Texture { name: String::new(), width: SIZE, height: SIZE, texels };
+    let mut scene = Scene { materials: vec![black(0.0), lamp], textures: vec![bright], up: Up::Z, ..Scene::default() };
+    scene.add_quad("floor", 0, square(2.0, 0.0, true));
+    scene.add_quad("lamp", 1, square(0.5, 0.3, false));
+    let uv = |p: &DVec3| Vec2::new(p.x as f32 + 0.5, p.y as f32 + 0.5);
+    scene.uvs[0] = scene.positions.iter().map(uv).collect();
+
+    // Every other element of the lamp is bright all over but for the places where it is sampled.
+    let mesh = Mesh::new(&scene);
+    let elements = Elements::new(&scene, &mesh, ELEMENT);
+    let mut dark = Vec::new();
+    for e in (0..elements.len() as u32).step_by(2) {
+        let (triangle, _) = elements.place(e);
+        if scene.triangle_object[mesh.source[triangle] as usize] == 1 {
+            dark.push(e as usize);
+            for k in 0..16 {
+                let (x, y) = (f64::from(k % 4) / 4.0 + 0.125, f64::from(k / 4) / 4.0 + 0.125);
+                let p = (uv(&mesh.point(triangle, elements.sample(e, x, y))) * SIZE as f32).as_ivec2();
+                for (x, y) in (-3..=3).flat_map(|y| (-3..=3).map(move |x| (p.x + x, p.y + y))) {
+                    let clamp = |i: i32| i.clamp(0, SIZE as i32 - 1) as u32;
+                    scene.textures[0].texels[(clamp(y) * SIZE + clamp(x)) as usize] = [0, 0, 0, 255];
+                }
+            }
+        }
+    }
+    let tracer = Tracer::new(&scene, &mesh);
+    let options = SolveOptions { element_size: Some(ELEMENT), ..SolveOptions::default() };
+    let solution = Solution::new(&tracer, &options, &()).unwrap();
+    assert!(!dark.is_empty() && dark.iter().all(|&e| solution.luminaires.promoted[e] == [0.0; 4]));
+    assert!(solution.luminaires.carries(elements.place(dark[0] as u32).0, Side::Front));
+    let places = [Place { point: DVec3::new(0.1, 0.1, 0.0), normal: DVec3::Z, triangle: u32::MAX }];
+    let receivers = PointReceivers { places: &places, shaded: &[] };
+    assert_eq!(solution.gather().irradiance(&receivers, 256, &()).unwrap(), [[[0.0; 3]; 2]]);
 }

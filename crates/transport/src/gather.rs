@@ -118,8 +118,7 @@ impl Gather<'_> {
                 normal: sign * mesh.normal(triangle),
                 triangle: triangle as u32,
             };
-            let promoted = self.luminaires.promoted[id as usize];
-            if promoted[..3].iter().all(|p| *p == 0.0) {
+            if !self.luminaires.carries(triangle, side) {
                 let luminance = scene.emitted_luminance(at);
                 for band in 0..3 {
                     sum[band] += throughput[band] * std::f64::consts::PI * f64::from(luminance[band]);

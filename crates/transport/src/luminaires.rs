@@ -67,6 +67,8 @@ pub struct Luminaires {
     pub lights: Vec<Light>,
     /// Exitance of each element (bands) that is counted through `lights` and must not be counted by rows as well.
     pub promoted: Vec<[f32; 4]>,
+    /// Triangles by side whose whole emission is carried by `lights`.
+    carried: Vec<[bool; 2]>,
 }
 
 impl Luminaires {
@@ -85,7 +87,8 @@ impl Luminaires {
         // Mean exitance of each triangle's sides from those of its elements.
         let mut pieces: Vec<(u32, Piece)> = Vec::new();
         let mut promoted = vec![[0f32; 4]; elements.len()];
-        for triangle in 0..mesh.triangles.len() {
+        let mut carried = vec![[false; 2]; mesh.triangles.len()];
+        for (triangle, carried) in carried.iter_mut().enumerate() {
             for side in [Side::Front, Side::Back] {
                 let own: Vec<usize> = elements
                     .cells_of(triangle, side)
@@ -114,6 +117,7 @@ impl Luminaires {
                         varied: varied(scene, source),
                     },
                 ));
+                carried[side as usize] = true;
                 for e in own {
                     promoted[e][..3].copy_from_slice(&exitance[e]);
                 }
@@ -148,7 +152,13 @@ impl Luminaires {
             });
         }
         lights.extend(scene.lights.iter().cloned().map(Light::Point));
-        Luminaires { lights, promoted }
+        Luminaires { lights, promoted, carried }
+    }
+
+    /// Whether all emission of a triangle's side reaches receivers through the lights. Its elements may still be dark
+    /// in [`Luminaires::promoted`], where their few samples miss what is bright in a picture.
+    pub fn carries(&self, triangle: usize, side: Side) -> bool {
+        self.carried[triangle][side as usize]
     }
 }
 
