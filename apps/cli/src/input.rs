@@ -126,7 +126,6 @@ pub fn load(arguments: &SceneArguments, global: &Global, progress: &Progress) ->
 
 /// The same without telling anybody.
 pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
-    let sky = arguments.sky.as_deref().map(parse_sky).transpose()?;
     let mut input = match &arguments.scene {
         None => Input {
             scene: radiosity::cornell_box(),
@@ -150,22 +149,23 @@ pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
             }
         }
     };
-    if let Some(sky) = sky {
-        input.scene.sky = sky;
+    if let Some(sky) = &arguments.sky {
+        set_sky(&mut input.scene, sky)?;
     }
     Ok(input)
 }
 
-fn parse_sky(text: &str) -> Result<Sky, Failure> {
+fn set_sky(scene: &mut Scene, text: &str) -> Result<(), Failure> {
     let wrong = || Failure::input(format!("--sky {text}: use uniform:L, overcast:E or hdr:FILE"));
     let (kind, value) = text.split_once(':').ok_or_else(wrong)?;
     let number = || value.parse::<f32>().ok().filter(|x| x.is_finite() && *x >= 0.0).ok_or_else(wrong);
     match kind {
-        "uniform" => Ok(Sky::Uniform([number()?; 3])),
-        "overcast" => Ok(Sky::Overcast { horizontal: [number()?; 3] }),
-        "hdr" => Ok(radiosity::io::load_sky_hdr(Path::new(value))?),
-        _ => Err(wrong()),
+        "uniform" => scene.sky = Sky::Uniform([number()?; 3]),
+        "overcast" => scene.sky = Sky::Overcast { horizontal: [number()?; 3] },
+        "hdr" => radiosity::io::load_sky_hdr(Path::new(value), scene)?,
+        _ => return Err(wrong()),
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -174,7 +174,11 @@ mod tests {
 
     #[test]
     fn skies_as_people_write_them() {
-        assert!(parse_sky("uniform:nan").is_err() && parse_sky("green").is_err() && parse_sky("hdr:").is_err());
-        assert_eq!(parse_sky("overcast:5000").unwrap(), Sky::Overcast { horizontal: [5000.0; 3] });
+        let mut scene = Scene::default();
+        for wrong in ["uniform:nan", "green", "hdr:"] {
+            assert!(set_sky(&mut scene, wrong).is_err());
+        }
+        set_sky(&mut scene, "overcast:5000").unwrap();
+        assert_eq!(scene.sky, Sky::Overcast { horizontal: [5000.0; 3] });
     }
 }

@@ -7,21 +7,23 @@ use crate::LoadError;
 use crate::source::read_plain_file;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
-use radiosity_scene::Sky;
+use radiosity_scene::{Scene, Sky};
 use std::io::Cursor;
 use std::path::Path;
 
 /// Most pixels of a sky: 16,384 x 8,192, whose pixel is 1/24 of the sun's disc across; it takes 1.6 GB.
 const MAX_PIXELS: u64 = 16_384 * 8_192;
 
-/// Reads a sky from a file.
-pub fn load_sky_hdr(path: &Path) -> Result<Sky, LoadError> {
+/// Reads a sky from a file into a scene, whose zenith is known by then. Suns in it become directional lights of the scene,
+/// as [`Scene::set_sky`] has it: what they light is exact, and their shadows have sharp edges.
+pub fn load_sky_hdr(path: &Path, scene: &mut Scene) -> Result<(), LoadError> {
     let bytes = read_plain_file(path).map_err(|error| LoadError::Io { path: path.to_owned(), error })?;
     let file = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
-    parse_sky(&file, &bytes)
+    scene.set_sky(parse_sky(&file, &bytes)?, &file);
+    Ok(())
 }
 
-/// As [`load_sky_hdr`], from memory; `file` is the name for messages.
+/// The sky in a file's bytes with its suns still in it; `file` is the name for messages.
 pub fn parse_sky(file: &str, bytes: &[u8]) -> Result<Sky, LoadError> {
     // The EXR decoder (exr 1.74) asserts where it should report (damaged B44 data bring it down). It holds no
     // state and no unsafe code, so a caught panic leaves nothing behind.
@@ -95,6 +97,30 @@ mod tests {
             assert!((up[1] - 0.0).abs() < 4.0 && (up[2] - 1000.0).abs() < 4.0, "{up:?}");
             assert!((east_of_north[0] - 8.0).abs() < 4.0, "{east_of_north:?}");
         }
+    }
+
+    #[test]
+    fn a_sun_in_the_file_becomes_a_light() {
+        let (width, height) = (128, 64);
+        let picture = image::Rgb32FImage::from_fn(width, height, |x, y| {
+            image::Rgb(if (x, y) == (64, 20) { [3e7, 2e7, 1e7] } else { [1000.0; 3] })
+        });
+        let path = std::env::temp_dir().join(format!("radiosity-sun-{}.exr", std::process::id()));
+        DynamicImage::ImageRgb32F(picture).save_with_format(&path, ImageFormat::OpenExr).unwrap();
+        let mut scene = Scene::default();
+        let result = load_sky_hdr(&path, &mut scene);
+        std::fs::remove_file(&path).unwrap();
+        result.unwrap();
+        let [sun] = scene.lights.as_slice() else { panic!("{:?}", scene.lights) };
+        assert!(sun.name.starts_with("sun of radiosity-sun-"), "{}", sun.name);
+        // The pixel lies between elevations of 30.94° and 33.75°, just right of the middle, which looks along −Z.
+        let solid_angle = (33.75f64.to_radians().sin() - 30.9375f64.to_radians().sin()) * std::f64::consts::TAU / 128.0;
+        let towards = DVec3::new(0.0246, 0.6374, -1.0).normalize();
+        assert!((-sun.direction).angle_between(towards) < 0.01, "{}", sun.direction);
+        for (e, l) in sun.intensity.iter().zip([3e7, 2e7, 1e7]) {
+            assert!((f64::from(*e) / ((l - 1000.0) * solid_angle) - 1.0).abs() < 1e-3, "{e}");
+        }
+        assert_eq!(scene.sky.luminance(towards, DVec3::Y), [1000.0; 3]);
     }
 
     #[test]

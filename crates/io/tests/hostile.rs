@@ -1,6 +1,7 @@
 //! Damaged files: every one is refused or loads into a scene that keeps its promises; none brings the reader down.
 
 use radiosity_io::{LoadOptions, Source, SourceError, gltf, obj, parse_points_csv, parse_sky};
+use radiosity_scene::Scene;
 use std::path::Path;
 
 /// The same bytes behind every address.
@@ -122,7 +123,11 @@ fn damaged_points_and_skies() {
         for point in parse_points_csv("t", &damaged(&csv, &mut random)).unwrap_or_default() {
             assert!(point.position.is_finite() && (point.normal.length() - 1.0).abs() < 1e-9, "{point:?}");
         }
-        let _ = parse_sky("t", &damaged(&hdr, &mut random));
+        if let Ok(sky) = parse_sky("t", &damaged(&hdr, &mut random)) {
+            let mut scene = Scene::default();
+            scene.set_sky(sky, "t");
+            assert!(scene.lights.iter().flat_map(|l| l.intensity).all(|e| e.is_finite()));
+        }
     }
 }
 

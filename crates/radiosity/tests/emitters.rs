@@ -3,9 +3,10 @@
 use glam::{DAffine2, DVec3, Vec2};
 use radiosity::transport::PointReceivers;
 use radiosity::{
-    AlphaMode, Elements, Material, Mesh, Place, Referee, Scene, Side, Solution, SolveOptions, Texture, TextureRef,
-    Tracer, Up, Wrap,
+    AlphaMode, Elements, Material, MeasureOptions, Mesh, Place, Referee, Scene, Side, Sky, Solution, SolveOptions,
+    Texture, TextureRef, Tracer, Up, Wrap, measure,
 };
+use std::f64::consts::PI;
 
 /// A square about the vertical axis at a height, facing up or down.
 fn square(half: f64, z: f64, up: bool) -> [DVec3; 4] {
@@ -117,4 +118,47 @@ fn lamps_with_pictures_are_counted_once() {
     let places = [Place { point: DVec3::new(0.1, 0.1, 0.0), normal: DVec3::Z, triangle: u32::MAX }];
     let receivers = PointReceivers { places: &places, shaded: &[] };
     assert_eq!(solution.gather().irradiance(&receivers, 256, &()).unwrap(), [[[0.0; 3]; 2]]);
+}
+
+/// A floor under a clear sky with a sun of 0.53°, against the integral of the map. Rows and gathers met the sun by chance,
+/// and so did the referee: the audit saw no more than its own noise.
+#[test]
+fn a_sun_in_the_sky_is_measured_and_certified() {
+    let (width, height) = (1024, 512);
+    let to_sun = DVec3::new(0.4, 0.5, 0.6).normalize();
+    let mut pixels = Vec::with_capacity(width * height);
+    let mut expected = 0.0;
+    for y in 0..height {
+        for x in 0..width {
+            let mut mean = 0.0;
+            // 8 × 8 places in each pixel.
+            for k in 0..64 {
+                let (u, v) = (x as f64 + ((k % 8) as f64 + 0.5) / 8.0, y as f64 + ((k / 8) as f64 + 0.5) / 8.0);
+                let (azimuth, elevation) = (2.0 * PI * (u / width as f64 - 0.5), PI * (0.5 - v / height as f64));
+                let level = elevation.cos();
+                let direction = DVec3::new(level * azimuth.sin(), level * azimuth.cos(), elevation.sin());
+                let angle = to_sun.angle_between(direction);
+                let sky = if elevation > 0.0 { 2000.0 + 10_000.0 * (-3.0 * angle).exp() } else { 500.0 };
+                mean += (sky + if angle < 0.00465 { 1.2e9 } else { 0.0 }) / 64.0;
+            }
+            pixels.push([mean as f32; 3]);
+            let [top, bottom] = [y, y + 1].map(|y| PI * (0.5 - y as f64 / height as f64));
+            let cosine = 0.5 * (top.sin().powi(2) - bottom.sin().powi(2));
+            expected += mean * cosine.max(0.0) * 2.0 * PI / width as f64;
+        }
+    }
+    let mut scene = Scene { materials: vec![Material::default()], up: Up::Z, ..Scene::default() };
+    scene.add_quad("floor", 0, square(2.0, 0.0, true));
+    scene.set_sky(Sky::Map { width, height, pixels }, "clear.hdr");
+    assert_eq!(scene.lights.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["sun of clear.hdr"]);
+
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let points: Vec<_> = (0..9).map(|i| (DVec3::new(0.4 * f64::from(i) - 1.6, 0.3, 0.0), DVec3::Z)).collect();
+    let measured =
+        measure(&tracer, &points, &MeasureOptions { error: 0.02, ..MeasureOptions::default() }, &()).unwrap();
+    assert!(measured.achieved, "{:?}", measured.audit);
+    for e in measured.irradiance {
+        assert!((f64::from(e[1]) / expected - 1.0).abs() < 0.02, "{} for {expected}", e[1]);
+    }
 }

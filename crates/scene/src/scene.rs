@@ -65,7 +65,7 @@ pub struct Scene {
     pub lights: Vec<PointLight>,
     /// Cameras.
     pub cameras: Vec<Camera>,
-    /// What escaping rays see.
+    /// What escaping rays see. [`Scene::set_sky`] sets a map that may have a sun.
     pub sky: Sky,
 }
 
@@ -159,6 +159,13 @@ impl Scene {
     /// Adds a planar convex quadrilateral (corners counter-clockwise from the front), split along corners 0 and 2.
     pub fn add_quad(&mut self, name: &str, material: usize, [a, b, c, d]: [DVec3; 4]) -> usize {
         self.add_triangles(name, material, &[[a, b, c], [a, c, d]])
+    }
+
+    /// Makes a sky what escaping rays see. The suns of a map become directional lights called "sun of `name`", on top of
+    /// the scene's own ([`Sky::take_suns`] says which and what is lost). Set [`Scene::up`] before.
+    pub fn set_sky(&mut self, mut sky: Sky, name: &str) {
+        self.lights.extend(sky.take_suns(&format!("sun of {name}"), self.up.direction()));
+        self.sky = sky;
     }
 
     /// Diffuse reflectance per band at a point, at most [`MAX_REFLECTANCE`].
