@@ -59,8 +59,9 @@ impl Texture {
     /// Bilinear look-up at `uv`. Colour is decoded from sRGB when `srgb`; alpha never is. All in 0..1.
     pub fn sample(&self, uv: DVec2, wrap: [Wrap; 2], srgb: bool) -> [f32; 4] {
         let (w, h) = (i64::from(self.width), i64::from(self.height));
+        // After the product, which may overflow where `uv` does not.
         let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
-        let (x, y) = (finite(uv.x) * w as f64 - 0.5, finite(uv.y) * h as f64 - 0.5);
+        let (x, y) = (finite(uv.x * w as f64) - 0.5, finite(uv.y * h as f64) - 0.5);
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
         let mut sum = [0.0; 4];
@@ -80,5 +81,22 @@ impl Texture {
             }
         }
         sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// KHR_texture_transform may move by 1e308: 64 times that is infinite, and its fraction was no number.
+    #[test]
+    fn coordinates_that_overflow_have_a_colour() {
+        let texture = Texture { name: "t".to_owned(), width: 64, height: 64, texels: vec![[128; 4]; 64 * 64] };
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            for u in [1e308, -1e308, 1e300, f64::MAX, f64::NAN, f64::INFINITY] {
+                let [r, ..] = texture.sample(DVec2::new(u, 0.5), [wrap; 2], false);
+                assert!((r - 128.0 / 255.0).abs() < 1e-6, "{r} at {u}, {wrap:?}");
+            }
+        }
     }
 }
