@@ -122,13 +122,11 @@ impl<'a> Assembly<'a> {
             return;
         }
 
-        // Vertices of dropped triangles keep their number but must not spoil bounds: they move onto a used one.
+        // Vertices that no triangle is left of keep their number but must not set bounds, and with them the distance
+        // within which vertices are welded: they move onto a used one.
         let anchor = used.iter().zip(&part.positions).find(|(used, _)| **used).map_or(DVec3::ZERO, |(_, p)| *p);
-        for (position, used) in part.positions.iter_mut().zip(&used) {
-            let usable = position.is_finite() && position.abs().max_element() <= MAX_COORDINATE;
-            if !used && !usable {
-                *position = anchor;
-            }
+        for (position, _) in part.positions.iter_mut().zip(&used).filter(|(_, used)| !**used) {
+            *position = anchor;
         }
         scene.positions.append(&mut part.positions);
         part.normals.resize(count, Vec3::ZERO);
@@ -319,6 +317,18 @@ mod tests {
         for expected in ["2 of 5 triangles name", "1 of 5 triangles have corners", "1 of 5 triangles have no area"] {
             assert!(text.contains(expected), "{text}");
         }
+    }
+
+    /// One stray vertex a thousand kilometres away made the welding distance a metre.
+    #[test]
+    fn vertices_without_a_face_do_not_set_the_bounds() {
+        let far = [[1e6, 0.0, 0.0], [2e6, 0.0, 0.0], [3e6, 0.0, 0.0]];
+        let corners: Vec<[f64; 3]> = far[..1].iter().chain(&CORNERS[..3]).chain(&far).copied().collect();
+        // The second triangle has no area.
+        let (scene, faults) = assemble(vec![part("a", 0, &corners, &[[1, 2, 3], [4, 5, 6]])]);
+        assert_eq!(scene.triangles, [[1, 2, 3]]);
+        assert_eq!(scene.positions.len(), 7);
+        assert_eq!(scene.bounding_box(), Some([DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0)]), "{faults}");
     }
 
     #[test]
