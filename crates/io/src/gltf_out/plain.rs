@@ -27,8 +27,12 @@ pub(super) fn build(scene: &Scene, primitives: &[LitPrimitive], style: &Style) -
     // A root turns the scene so that its zenith is glTF's +Y.
     let mut children = Vec::new();
     let root = builder.push("nodes", json!({ "name": if scene.name.is_empty() { "scene" } else { &scene.name } }));
+    let mut of_object: BTreeMap<usize, Vec<&LitPrimitive>> = BTreeMap::new();
+    for lit in primitives {
+        of_object.entry(lit.object).or_default().push(lit);
+    }
     for (index, object) in scene.objects.iter().enumerate() {
-        let mut lit: Vec<&LitPrimitive> = primitives.iter().filter(|lit| lit.object == index).collect();
+        let mut lit = of_object.remove(&index).unwrap_or_default();
         let own;
         if lit.is_empty() {
             own = unlit(scene, index, object);

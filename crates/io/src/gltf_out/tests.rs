@@ -337,6 +337,19 @@ fn a_scene_without_gltf_comes_back_as_it_was() {
     assert!((eye - DVec3::new(3.0, 3.0, -3.0)).length() < 1e-5, "{eye}");
 }
 
+/// Every object looked through all primitives, so that time went with the square of their number.
+#[test]
+fn many_objects_are_written_in_time_that_goes_with_their_number() {
+    let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
+    for i in 0..100_000 {
+        scene.add_triangles("t", 0, &[[DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, f64::from(i))]]);
+    }
+    let lit = halved(&scene, |_| Light::None);
+    let start = std::time::Instant::now();
+    assert!(!lit_glb(&scene, None, &lit, &Style::Vertices).unwrap().is_empty());
+    assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+}
+
 #[test]
 fn a_file_is_written_whole_or_not_at_all() {
     let before = load(source().to_string().as_bytes());
