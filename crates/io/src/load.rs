@@ -2,7 +2,8 @@
 
 use crate::source::read_plain_file;
 use crate::{Document, Folder, LoadError, LoadOptions, gltf, obj};
-use radiosity_scene::{Faults, Scene};
+use radiosity_scene::{Faults, Mesh, Scene};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Most faults that are kept of one file; a damaged one can have millions, and nobody reads past the first hundreds.
@@ -21,7 +22,15 @@ pub struct Loaded {
 
 impl Loaded {
     /// The result of reading: an error where the faults say so, or where the scene breaks its promises.
-    pub(crate) fn checked(scene: Scene, mut faults: Faults, document: Option<Document>) -> Result<Loaded, LoadError> {
+    pub(crate) fn checked(
+        file: &str,
+        scene: Scene,
+        mut faults: Faults,
+        document: Option<Document>,
+    ) -> Result<Loaded, LoadError> {
+        if !faults.has_errors() {
+            warn_of_small_triangles(file, &scene, &mut faults);
+        }
         if faults.0.len() > MAX_FAULTS {
             let (more, errors) = (faults.0.len() - MAX_FAULTS, faults.has_errors());
             // The worst first, so that no error is lost behind warnings.
@@ -31,6 +40,25 @@ impl Loaded {
             faults.note("", format!("and {more} more"), "");
         }
         if faults.has_errors() { Err(LoadError::Faults(faults)) } else { Ok(Loaded { scene, faults, document }) }
+    }
+}
+
+/// Warns of triangles that will vanish when touching surfaces are sewn together.
+fn warn_of_small_triangles(file: &str, scene: &Scene, faults: &mut Faults) {
+    let (dropped, distance) = Mesh::would_drop(scene);
+    let mut of_object: BTreeMap<u32, usize> = BTreeMap::new();
+    for triangle in dropped {
+        *of_object.entry(scene.triangle_object[triangle as usize]).or_default() += 1;
+    }
+    for (object, count) in of_object {
+        let object = &scene.objects[object as usize];
+        let what = format!(
+            "{count} of {} triangles are smaller than the distance within which vertices are sewn together, \
+             {distance:.1e} m (a millionth of the scene's extent); they are left out",
+            object.triangles.len()
+        );
+        let hint = "harmless where they are slivers; where they matter, remove what lies far away from them";
+        faults.warning(format!("{file}: object '{}'", object.name), what, hint);
     }
 }
 
@@ -56,4 +84,21 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     };
     loaded.scene.name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     Ok(loaded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Memory;
+
+    #[test]
+    fn triangles_that_vanish_in_sewing_are_a_warning() {
+        let text = "v 0 0 0\nv 1e5 0 0\nv 0 1e5 0\no ground\nf 1 2 3\n\
+                    v 5 5 1\nv 5.05 5 1\nv 5 5.05 1\nv 9 9 1\no dot\nf 4 5 6\nf 4 5 7\n";
+        let loaded = obj::load("t.obj", text.as_bytes(), &Memory::default(), &LoadOptions::default()).unwrap();
+        let text = loaded.faults.to_string();
+        assert!(text.contains("warning: t.obj: object 'dot': 2 of 2 triangles are smaller"), "{text}");
+        assert!(text.contains("1.0e-1 m"), "{text}");
+        assert!(!text.contains("ground"), "{text}");
+    }
 }

@@ -56,6 +56,8 @@ pub struct Mesh {
     pub smooth_count: usize,
     /// Distance within which vertices were welded, metres.
     pub tolerance: f64,
+    /// Scene triangles that are missing here: two of their corners were welded into one.
+    pub dropped: Vec<u32>,
 }
 
 const WHOLE: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::Y];
@@ -63,11 +65,7 @@ const WHOLE: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::Y];
 impl Mesh {
     /// Welds a scene.
     pub fn new(scene: &Scene) -> Mesh {
-        let extent = match scene.bounding_box() {
-            Some([lo, hi]) => (hi - lo).max_element(),
-            None => 0.0,
-        };
-        let tolerance = (extent * WELD).max(f64::MIN_POSITIVE);
+        let tolerance = weld_distance(scene);
         let (vertices, welded) = weld(&scene.positions, tolerance);
 
         let mut mesh = Mesh { vertices, tolerance, ..Mesh::default() };
@@ -76,11 +74,35 @@ impl Mesh {
             if corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0] {
                 mesh.triangles.push(corners);
                 mesh.source.push(index as u32);
+            } else {
+                mesh.dropped.push(index as u32);
             }
         }
         mesh.conform();
         mesh.smoothen(scene);
         mesh
+    }
+
+    /// What [`Mesh::dropped`] of a scene will be, and the distance within which its vertices are welded: for readers,
+    /// who can say so while the names of the file are at hand.
+    pub fn would_drop(scene: &Scene) -> (Vec<u32>, f64) {
+        let tolerance = weld_distance(scene);
+        // Both ends of an edge that vanishes are within the distance of one vertex. Few scenes have one so short, and
+        // only those are welded here.
+        let short = |&t: &usize| {
+            let [a, b, c] = scene.corners(t);
+            [(a, b), (b, c), (c, a)].iter().any(|(p, q)| p.distance(*q) <= 2.0 * tolerance)
+        };
+        let suspects: Vec<usize> = (0..scene.triangles.len()).filter(short).collect();
+        if suspects.is_empty() {
+            return (Vec::new(), tolerance);
+        }
+        let (_, welded) = weld(&scene.positions, tolerance);
+        let vanishes = |&t: &usize| {
+            let [a, b, c] = scene.triangles[t].map(|v| welded[v as usize]);
+            a == b || b == c || c == a
+        };
+        (suspects.into_iter().filter(vanishes).map(|t| t as u32).collect(), tolerance)
     }
 
     /// Corner positions of a triangle.
@@ -337,6 +359,11 @@ fn ordered(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
+fn weld_distance(scene: &Scene) -> f64 {
+    let extent = scene.bounding_box().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
+    (extent * WELD).max(f64::MIN_POSITIVE)
+}
+
 /// Representative positions, and the representative of each input position. The first of a cluster represents it.
 fn weld(positions: &[DVec3], tolerance: f64) -> (Vec<DVec3>, Vec<u32>) {
     let cell = 2.0 * tolerance;
@@ -442,6 +469,22 @@ mod tests {
         // Each quad keeps its four smooth vertices.
         assert_eq!(mesh.smooth_count, 4 * count as usize);
         assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+    }
+
+    /// A scene with 100 km of ground is welded within 10 cm: what is smaller went without a word.
+    #[test]
+    fn triangles_that_welding_drops_are_named() {
+        let mut scene = Scene::default();
+        quad(&mut scene, [[0., 0., 0.], [1e5, 0., 0.], [1e5, 1e5, 0.], [0., 1e5, 0.]]);
+        quad(&mut scene, [[5., 5., 1.], [5.05, 5., 1.], [5.05, 5.05, 1.], [5., 5.05, 1.]]);
+        quad(&mut scene, [[8., 5., 1.], [8.15, 5., 1.], [8.15, 5.15, 1.], [8., 5.15, 1.]]);
+        let mesh = Mesh::new(&scene);
+        assert_eq!((mesh.dropped.as_slice(), mesh.triangles.len()), (&[2, 3][..], 4));
+        assert_eq!(Mesh::would_drop(&scene), (vec![2, 3], mesh.tolerance));
+        assert!((mesh.tolerance - 0.1).abs() < 1e-12);
+        scene.positions.truncate(6);
+        scene.triangles.truncate(2);
+        assert_eq!(Mesh::would_drop(&scene).0, []);
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub fn load(file: &str, bytes: &[u8], source: &dyn Source, options: &LoadOptions
     }
 
     let scene = assembly.finish(file, &mut faults);
-    Loaded::checked(scene, faults, Some(document))
+    Loaded::checked(file, scene, faults, Some(document))
 }
 
 fn note_metals(assembly: &Assembly<'_>, file: &str, faults: &mut Faults) {

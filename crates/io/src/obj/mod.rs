@@ -67,7 +67,7 @@ pub fn load(file: &str, bytes: &[u8], source: &dyn Source, options: &LoadOptions
         }
     }
     let scene = assembly.finish(file, &mut faults);
-    Loaded::checked(scene, faults, None)
+    Loaded::checked(file, scene, faults, None)
 }
 
 /// Lines by number from 1, comments removed, those that end in a backslash joined with the next.
