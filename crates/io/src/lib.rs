@@ -13,6 +13,7 @@
 //! ```
 
 mod assemble;
+mod bytes;
 mod data_uri;
 mod error;
 pub mod gltf;
@@ -26,6 +27,7 @@ mod points;
 mod sky;
 pub mod source;
 
+pub use bytes::Bytes;
 pub use error::LoadError;
 pub use gltf::{Document, EncodedImage};
 pub use load::{Loaded, load};

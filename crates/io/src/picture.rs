@@ -12,7 +12,7 @@ const MAX_SIDE: u32 = 16_384;
 /// name many of them; the largest scenes in common use carry half of this.
 pub(crate) const MAX_TEXELS: u64 = 1 << 29;
 
-/// Decodes a picture. Takes its texels off `budget`.
+/// Decodes a picture. Takes its texels off `budget`, also where it turns out damaged: trying took the time and memory.
 pub(crate) fn decode(name: &str, bytes: &[u8], budget: &mut u64) -> Result<Texture, String> {
     let format = image::guess_format(bytes).ok();
     let format = format.filter(|f| matches!(f, ImageFormat::Png | ImageFormat::Jpeg)).ok_or("neither PNG nor JPEG")?;
@@ -29,8 +29,8 @@ pub(crate) fn decode(name: &str, bytes: &[u8], budget: &mut u64) -> Result<Textu
     if count > *budget {
         return Err(format!("{width} x {height} texels; all pictures together may have {MAX_TEXELS}"));
     }
-    let decoded = reader(bytes).decode().map_err(|error| error.to_string())?.into_rgba8();
     *budget -= count;
+    let decoded = reader(bytes).decode().map_err(|error| error.to_string())?.into_rgba8();
     let texels = decoded.pixels().map(|pixel| pixel.0).collect();
     Ok(Texture { name: name.to_owned(), width, height, texels })
 }
@@ -53,6 +53,16 @@ mod tests {
         let mut bytes = Cursor::new(Vec::new());
         picture.write_to(&mut bytes, ImageFormat::Png).unwrap();
         bytes.into_inner()
+    }
+
+    /// A file may hold thousands of damaged pictures of a gigabyte each.
+    #[test]
+    fn damaged_pictures_count_as_well() {
+        let bytes = png(30, 20);
+        let mut budget = 1000;
+        assert!(decode("t", &bytes[..bytes.len() / 2], &mut budget).is_err());
+        assert_eq!(budget, 400);
+        assert!(decode("t", &bytes, &mut budget).unwrap_err().contains("all pictures together"));
     }
 
     #[test]

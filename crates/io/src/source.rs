@@ -121,7 +121,7 @@ pub(crate) fn read_plain_file(path: &Path) -> std::io::Result<Vec<u8>> {
 }
 
 /// The relative path that an address means, with `.` and inner `..` resolved; never leads above its start.
-fn relative_path(uri: &str) -> Result<PathBuf, SourceError> {
+pub(crate) fn relative_path(uri: &str) -> Result<PathBuf, SourceError> {
     let decoded = percent_decoded(uri).ok_or_else(|| SourceError::NotAPath(uri.to_owned()))?;
     if decoded.is_empty() || decoded.contains('\0') {
         return Err(SourceError::NotAPath(uri.to_owned()));

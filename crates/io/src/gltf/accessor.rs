@@ -5,8 +5,10 @@
 
 use super::Document;
 use super::json::{list, shown, text, whole};
+use crate::Bytes;
 use glam::{DMat4, Vec2, Vec3, Vec4};
 use serde_json::Value;
+use std::ops::Range;
 
 /// Most components of an accessor that stands for zeros without any bytes behind it. Morph targets use such accessors, with as many
 /// elements as their mesh has vertices; 4 million components are those of a mesh of 1.4 million vertices, or 16 MB.
@@ -139,6 +141,18 @@ struct Sparse<'a> {
 impl Document {
     /// The bytes of a buffer view and its stride, where it has one.
     pub fn view(&self, index: usize) -> Result<(&[u8], Option<usize>), AccessorError> {
+        let (buffer, range, stride) = self.stretch(index)?;
+        Ok((&buffer[range], stride))
+    }
+
+    /// The bytes of a buffer view, to be kept beside the document without a copy.
+    pub(super) fn view_bytes(&self, index: usize) -> Result<Bytes, AccessorError> {
+        let (buffer, range, _) = self.stretch(index)?;
+        Ok(buffer.part(range).unwrap_or_default())
+    }
+
+    /// The buffer behind a view, the view's place in it, which is inside, and its stride.
+    fn stretch(&self, index: usize) -> Result<(&Bytes, Range<usize>, Option<usize>), AccessorError> {
         let place = format!("bufferViews[{index}]");
         let views = list(&self.json, "bufferViews");
         let view = views.get(index).ok_or_else(|| invalid(&place, format!("there are only {}", views.len())))?;
@@ -153,11 +167,10 @@ impl Document {
         if self.not_loaded.contains(&buffer) {
             return Err(AccessorError::BufferNotLoaded(buffer));
         }
-        let end = offset.checked_add(length);
-        let slice = end.and_then(|end| bytes.get(offset..end)).ok_or_else(|| {
+        let end = offset.checked_add(length).filter(|end| *end <= bytes.len()).ok_or_else(|| {
             invalid(&place, format!("{length} bytes from {offset} on, but its buffer has {}", bytes.len()))
         })?;
-        Ok((slice, stride))
+        Ok((bytes, offset..end, stride))
     }
 
     /// An accessor, with every size checked.
@@ -383,7 +396,7 @@ mod tests {
 
     fn document(views: Value, accessors: Value, bytes: &[u8]) -> Document {
         let json = json!({ "asset": {"version": "2.0"}, "bufferViews": views, "accessors": accessors });
-        Document { json, buffers: vec![bytes.to_vec()], ..Document::default() }
+        Document { json, buffers: vec![bytes.to_vec().into()], ..Document::default() }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use super::json::{list, shown, text, whole};
 use super::meshopt::{self, Filter, Mode};
 use super::{AccessorError, Component, Document};
+use crate::Bytes;
 use draco_core::{DecodeLimits, DecoderBuffer, FaceIndex, Mesh, MeshDecoder};
 use radiosity_scene::Faults;
 use serde_json::{Value, json};
@@ -81,13 +82,14 @@ impl Document {
                     },
                 };
                 if let Some(decoded) = decoded {
-                    let target = &mut self.buffers[buffer];
+                    let mut target = std::mem::take(&mut self.buffers[buffer]).into_vec();
                     target.resize(target.len().next_multiple_of(4), 0);
                     new_place = Some((target.len(), decoded.len()));
                     target.extend(decoded);
+                    self.buffers[buffer] = target.into();
                 }
             }
-            let length = self.buffers.get(buffer).map_or(0, Vec::len);
+            let length = self.buffers.get(buffer).map_or(0, |bytes| bytes.len());
             if let Some(view) = self.json.pointer_mut(&format!("/bufferViews/{index}")) {
                 remove_extension(view, name);
                 if let Some((offset, length)) = new_place {
@@ -250,8 +252,8 @@ impl Document {
             let views = list(&self.json, "bufferViews").len();
             push(&mut self.json, "buffers", json!({ "byteLength": bytes.len() }));
             push(&mut self.json, "bufferViews", json!({ "buffer": buffers, "byteLength": bytes.len() }));
-            self.buffers.resize(buffers, Vec::new());
-            self.buffers.push(bytes);
+            self.buffers.resize(buffers, Bytes::default());
+            self.buffers.push(bytes.into());
             if let Some(json) = self.json.pointer_mut(&pointer).and_then(Value::as_object_mut) {
                 json.insert("bufferView".to_owned(), json!(views));
                 json.insert("count".to_owned(), json!(count));

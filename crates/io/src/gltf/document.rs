@@ -6,10 +6,12 @@
 
 use super::decompress;
 use super::json::{list, shown, text, whole};
-use crate::{Source, data_uri};
+use crate::source::relative_path;
+use crate::{Bytes, Source, SourceError, data_uri};
 use radiosity_scene::Faults;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// A glTF with everything it refers to in memory.
 #[derive(Clone, Debug, Default)]
@@ -17,13 +19,13 @@ pub struct Document {
     /// The whole JSON, extensions and extras included.
     pub json: Value,
     /// Bytes by buffer index, `byteLength` long each; empty where a buffer could not be loaded.
-    pub buffers: Vec<Vec<u8>>,
+    pub buffers: Vec<Bytes>,
     /// Encoded pictures by image index; `None` where one could not be loaded.
     pub images: Vec<Option<EncodedImage>>,
     /// Buffers that could not be loaded and were reported.
     pub(crate) not_loaded: Vec<usize>,
     /// Buffers to be filled by decoding, with the uncompressed bytes the file may hold of them.
-    pub(crate) placeholders: BTreeMap<usize, Vec<u8>>,
+    pub(crate) placeholders: BTreeMap<usize, Bytes>,
 }
 
 /// A picture as the file carries it.
@@ -32,7 +34,7 @@ pub struct EncodedImage {
     /// Media type, told from the first bytes; empty where unknown.
     pub mime: String,
     /// The encoded bytes.
-    pub bytes: Vec<u8>,
+    pub bytes: Bytes,
 }
 
 const GLB_MAGIC: &[u8] = b"glTF";
@@ -85,13 +87,14 @@ impl Document {
         }
 
         let mut document = Document { json, ..Document::default() };
-        document.load_buffers(file, chunk, source, faults);
+        let mut files = Files { source, known: BTreeMap::new() };
+        document.load_buffers(file, chunk, &mut files, faults);
         document.decompress(file, faults);
-        document.load_images(file, source, faults);
+        document.load_images(file, &mut files, faults);
         Some(document)
     }
 
-    fn load_buffers(&mut self, file: &str, chunk: Option<&[u8]>, source: &dyn Source, faults: &mut Faults) {
+    fn load_buffers(&mut self, file: &str, chunk: Option<&[u8]>, files: &mut Files<'_>, faults: &mut Faults) {
         for (index, buffer) in list(&self.json, "buffers").iter().enumerate() {
             let place = format!("{file}: buffers[{index}]");
             let length = buffer.get("byteLength");
@@ -99,31 +102,30 @@ impl Document {
             let has_bytes = uri.is_some() || (index == 0 && chunk.is_some());
             // What stands for decoded data need not be there; it is kept for the case that decoding fails.
             if decompress::is_placeholder(&self.json, index, has_bytes) {
-                let fallback = uri.and_then(|uri| read_uri(uri, source, &place, &mut Faults::default()));
+                let fallback = uri.and_then(|uri| files.read(uri, &place, &mut Faults::default()));
                 self.placeholders.insert(index, fallback.map(|(_, bytes)| bytes).unwrap_or_default());
-                self.buffers.push(Vec::new());
+                self.buffers.push(Bytes::default());
                 continue;
             }
             let loaded = match (uri, chunk) {
-                (Some(uri), _) => read_uri(uri, source, &place, faults).map(|(_, bytes)| bytes),
-                (None, Some(chunk)) if index == 0 => Some(chunk.to_vec()),
+                (Some(uri), _) => files.read(uri, &place, faults).map(|(_, bytes)| bytes),
+                (None, Some(chunk)) if index == 0 => Some(Bytes::from(chunk.to_vec())),
                 (None, _) => {
                     faults.error(&place, "neither a uri nor a binary chunk", "export the model again");
                     None
                 }
             };
-            let checked = loaded.and_then(|mut bytes| {
+            let checked = loaded.and_then(|bytes| {
                 let Some(length) = length.and_then(whole) else {
                     faults.error(&place, format!("byteLength is {}", shown(length)), "export the model again");
                     return None;
                 };
-                if bytes.len() < length {
+                let cut = bytes.part(0..length);
+                if cut.is_none() {
                     let what = format!("byteLength is {length}, but there are only {} bytes", bytes.len());
                     faults.error(&place, what, "the file is cut short; copy or export it again");
-                    return None;
                 }
-                bytes.truncate(length);
-                Some(bytes)
+                cut
             });
             if checked.is_none() {
                 self.not_loaded.push(index);
@@ -132,7 +134,7 @@ impl Document {
         }
     }
 
-    fn load_images(&mut self, file: &str, source: &dyn Source, faults: &mut Faults) {
+    fn load_images(&mut self, file: &str, files: &mut Files<'_>, faults: &mut Faults) {
         let mut images = Vec::new();
         for (index, image) in list(&self.json, "images").iter().enumerate() {
             let place = format!("{file}: images[{index}]");
@@ -140,14 +142,14 @@ impl Document {
                 // A missing picture is a missing colour, not a missing scene: a warning.
                 (Some(uri), _) => {
                     let mut own = Faults::default();
-                    let loaded = read_uri(uri, source, &place, &mut own);
+                    let loaded = files.read(uri, &place, &mut own);
                     for fault in own.0 {
                         faults.warning(fault.place, fault.what, fault.hint);
                     }
                     loaded
                 }
-                (None, Some(view)) => match whole(view).map(|view| self.view(view)) {
-                    Some(Ok((bytes, _))) => Some((text(image, "mimeType").to_owned(), bytes.to_vec())),
+                (None, Some(view)) => match whole(view).map(|view| self.view_bytes(view)) {
+                    Some(Ok(bytes)) => Some((text(image, "mimeType").to_owned(), bytes)),
                     Some(Err(error)) => {
                         faults.warning(&place, error.to_string(), "export the model again");
                         None
@@ -183,20 +185,36 @@ fn sniff(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-fn read_uri(uri: &str, source: &dyn Source, place: &str, faults: &mut Faults) -> Option<(String, Vec<u8>)> {
-    match data_uri::decode(uri) {
-        Some(Ok(decoded)) => Some(decoded),
-        Some(Err(what)) => {
-            faults.error(place, what, "export the model again");
-            None
-        }
-        None => match source.read(uri) {
-            Ok(bytes) => Some((String::new(), bytes)),
+/// What addresses name; a file that several of them name is read once, in whatever way they spell it.
+struct Files<'a> {
+    source: &'a dyn Source,
+    known: BTreeMap<PathBuf, Result<Bytes, SourceError>>,
+}
+
+impl Files<'_> {
+    /// Media type, where the address says it, and bytes.
+    fn read(&mut self, uri: &str, place: &str, faults: &mut Faults) -> Option<(String, Bytes)> {
+        let read = match data_uri::decode(uri) {
+            Some(Ok((mime, bytes))) => return Some((mime, bytes.into())),
+            Some(Err(what)) => {
+                faults.error(place, what, "export the model again");
+                return None;
+            }
+            None => match relative_path(uri) {
+                Ok(path) => {
+                    let source = self.source;
+                    &*self.known.entry(path).or_insert_with(|| source.read(uri).map(Bytes::from))
+                }
+                Err(_) => &self.source.read(uri).map(Bytes::from),
+            },
+        };
+        match read {
+            Ok(bytes) => Some((String::new(), bytes.clone())),
             Err(error) => {
                 faults.error(place, error.to_string(), error.hint());
                 None
             }
-        },
+        }
     }
 }
 
@@ -239,4 +257,43 @@ fn split_glb(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
         at = end;
     }
     Ok((json.ok_or("has no JSON chunk")?, binary))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+    use std::cell::Cell;
+
+    /// Counts how often it is asked.
+    struct Counting(Cell<usize>);
+
+    impl Source for Counting {
+        fn read(&self, _: &str) -> Result<Vec<u8>, SourceError> {
+            self.0.set(self.0.get() + 1);
+            Ok(vec![7; 1000])
+        }
+    }
+
+    /// 20,000 pictures of one view of 2 MB asked for 40 GB, and every address was read anew.
+    #[test]
+    fn what_is_named_many_times_is_held_once() {
+        let uris = ["a.bin", "./a.bin", "b/../%61.bin"];
+        let buffers: Vec<Value> = (0..300).map(|i| json!({ "uri": uris[i % 3], "byteLength": 1 + i })).collect();
+        let mut images: Vec<Value> = (0..300).map(|i| json!({ "uri": uris[i % 3] })).collect();
+        images.extend((0..300).map(|_| json!({ "bufferView": 0 })));
+        let views = json!([{ "buffer": 250, "byteOffset": 50, "byteLength": 100 }]);
+        let json = json!({ "asset": {"version": "2.0"}, "buffers": buffers, "bufferViews": views, "images": images });
+        let (source, mut faults) = (Counting(Cell::new(0)), Faults::default());
+        let document = Document::read("t", json.to_string().as_bytes(), &source, &mut faults).unwrap();
+        assert!(faults.0.is_empty(), "{faults}");
+        assert_eq!(source.0.get(), 1);
+        let first = document.buffers[0].as_ptr();
+        assert!(document.buffers.iter().enumerate().all(|(i, bytes)| bytes.len() == 1 + i && bytes.as_ptr() == first));
+        for (i, image) in document.images.iter().enumerate() {
+            let image = image.as_ref().unwrap();
+            let (offset, length) = if i < 300 { (0, 1000) } else { (50, 100) };
+            assert_eq!((image.bytes.as_ptr(), image.bytes.len()), (first.wrapping_add(offset), length));
+        }
+    }
 }

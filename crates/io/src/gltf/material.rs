@@ -12,6 +12,7 @@ use crate::picture;
 use glam::{DAffine2, DMat2, DVec2};
 use radiosity_scene::{AlphaMode, Faults, Material, Texture, TextureRef, Wrap};
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// Reflectance of a surface whose author named no material.
 pub(crate) const UNNAMED_REFLECTANCE: f32 = 0.5;
@@ -23,13 +24,8 @@ pub(crate) struct Materials {
 }
 
 pub(crate) fn read(document: &Document, file: &str, faults: &mut Faults) -> Materials {
-    let mut pictures = Pictures {
-        document,
-        file,
-        decoded: vec![None; document.images.len()],
-        textures: Vec::new(),
-        budget: picture::MAX_TEXELS,
-    };
+    let mut pictures =
+        Pictures { document, file, decoded: BTreeMap::new(), textures: Vec::new(), budget: picture::MAX_TEXELS };
     let all = list(&document.json, "materials");
     let mut materials: Vec<Material> =
         all.iter().enumerate().map(|(index, json)| material(json, index, &mut pictures, faults)).collect();
@@ -136,8 +132,8 @@ fn factor<const N: usize>(json: &Value, name: &str, default: [f32; N], place: &s
 struct Pictures<'a> {
     document: &'a Document,
     file: &'a str,
-    /// By image index: not yet tried, or the texture that came of it.
-    decoded: Vec<Option<Option<usize>>>,
+    /// By place of the encoded bytes, since several images may name the same: the texture that came of them.
+    decoded: BTreeMap<(*const u8, usize), Option<usize>>,
     textures: Vec<Texture>,
     budget: u64,
 }
@@ -177,36 +173,33 @@ impl Pictures<'_> {
             faults.warning(place, what, "export with PNG or JPEG pictures");
             return None;
         };
-        let Some(slot) = self.decoded.get_mut(source) else {
+        let Some(loaded) = self.document.images.get(source) else {
             faults.warning(place, format!("image {source} does not exist; ignored"), "export the model again");
             return None;
         };
-        if let Some(known) = slot {
+        // What could not be loaded was reported when the document was read.
+        let encoded = loaded.as_ref()?;
+        if let Some(known) = self.decoded.get(&encoded.bytes.place()) {
             return *known;
         }
-        // What could not be loaded was reported when the document was read.
-        let texture = self.document.images.get(source).and_then(Option::as_ref).and_then(|encoded| {
-            let json = list(&self.document.json, "images").get(source)?;
-            let uri = text(json, "uri");
-            let name = match (text(json, "name"), uri) {
-                ("", uri) if uri.is_empty() || uri.starts_with("data:") => format!("image {source}"),
-                ("", uri) => uri.to_owned(),
-                (name, _) => name.to_owned(),
-            };
-            match picture::decode(&name, &encoded.bytes, &mut self.budget) {
-                Ok(texture) => Some(texture),
-                Err(what) => {
-                    let place = format!("{}: images[{source}] '{name}'", self.file);
-                    faults.warning(place, format!("cannot be decoded: {what}; ignored"), "export it as PNG or JPEG");
-                    None
-                }
+        let json = list(&self.document.json, "images").get(source).unwrap_or(&Value::Null);
+        let name = match (text(json, "name"), text(json, "uri")) {
+            ("", uri) if uri.is_empty() || uri.starts_with("data:") => format!("image {source}"),
+            ("", uri) => uri.to_owned(),
+            (name, _) => name.to_owned(),
+        };
+        let index = match picture::decode(&name, &encoded.bytes, &mut self.budget) {
+            Ok(texture) => {
+                self.textures.push(texture);
+                Some(self.textures.len() - 1)
             }
-        });
-        let index = texture.map(|texture| {
-            self.textures.push(texture);
-            self.textures.len() - 1
-        });
-        *slot = Some(index);
+            Err(what) => {
+                let place = format!("{}: images[{source}] '{name}'", self.file);
+                faults.warning(place, format!("cannot be decoded: {what}; ignored"), "export it as PNG or JPEG");
+                None
+            }
+        };
+        self.decoded.insert(encoded.bytes.place(), index);
         index
     }
 }
@@ -253,6 +246,27 @@ mod tests {
         assert_eq!(material.emissive, [400.0, 200.0, 100.0]);
         assert_eq!(material.alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
         assert!(material.double_sided && faults.0.is_empty(), "{faults}");
+    }
+
+    #[test]
+    fn a_picture_that_many_images_name_is_decoded_once() {
+        let mut png = std::io::Cursor::new(Vec::new());
+        image::RgbaImage::new(8, 8).write_to(&mut png, image::ImageFormat::Png).unwrap();
+        let bytes = crate::Bytes::from(png.into_inner());
+        let image = crate::gltf::EncodedImage { mime: "image/png".to_owned(), bytes };
+        let indices: Vec<usize> = (0..50).collect();
+        let textures: Vec<Value> = indices.iter().map(|i| json!({ "source": i })).collect();
+        let materials: Vec<Value> =
+            indices.iter().map(|i| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } })).collect();
+        let document = Document {
+            json: json!({ "materials": materials, "textures": textures, "images": vec![json!({}); 50] }),
+            images: vec![Some(image); 50],
+            ..Document::default()
+        };
+        let mut faults = Faults::default();
+        let read = read(&document, "t", &mut faults);
+        assert_eq!((read.textures.len(), read.materials.len(), faults.0.len()), (1, 51, 0), "{faults}");
+        assert!(read.materials[..50].iter().all(|m| m.base_color_texture.as_ref().is_some_and(|t| t.texture == 0)));
     }
 
     #[test]

@@ -282,12 +282,13 @@ fn place(builder: &mut Builder, node: usize, meshes: &[usize], instances: Option
     }
 }
 
-/// Pictures from other files move into this one.
+/// Pictures from other files move into this one; once, however many images name them.
 fn embed_pictures(builder: &mut Builder, document: &Document) {
+    let mut known = BTreeMap::new();
     for (index, picture) in document.images.iter().enumerate() {
         let outside = builder.list("images").get(index).is_some_and(|json| json.get("uri").is_some());
         let (true, Some(picture)) = (outside, picture) else { continue };
-        let view = builder.view(&picture.bytes, Target::None);
+        let view = *known.entry(picture.bytes.place()).or_insert_with(|| builder.view(&picture.bytes, Target::None));
         if let Some(json) = builder.list("images").get_mut(index).and_then(Value::as_object_mut) {
             json.remove("uri");
             json.insert("bufferView".into(), view.into());
@@ -296,7 +297,8 @@ fn embed_pictures(builder: &mut Builder, document: &Document) {
     }
 }
 
-/// Drops accessors and buffer views that nothing uses any more and copies the bytes of the others.
+/// Drops accessors and buffer views that nothing uses any more and copies the bytes of the others, those of equal views
+/// once.
 fn compact(builder: &mut Builder, document: &Document, old_views: usize) -> Result<(), WriteError> {
     let count = builder.list("accessors").len();
     let known = |name: &Value| name.as_str().is_some_and(|name| WITHOUT_ACCESSORS.contains(&name));
@@ -318,9 +320,11 @@ fn compact(builder: &mut Builder, document: &Document, old_views: usize) -> Resu
             }
         });
     }
+    let mut known = BTreeMap::new();
     for (index, _) in used.iter().enumerate().take(old_views).filter(|(_, used)| **used) {
         let (bytes, _) = document.view(index)?;
-        let (offset, length) = (builder.append(bytes), bytes.len());
+        let length = bytes.len();
+        let offset = *known.entry((bytes.as_ptr(), length)).or_insert_with(|| builder.append(bytes));
         if let Some(view) = builder.list("bufferViews").get_mut(index) {
             view["buffer"] = 0.into();
             view["byteOffset"] = offset.into();

@@ -350,6 +350,29 @@ fn many_objects_are_written_in_time_that_goes_with_their_number() {
     assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
 }
 
+/// A hundred pictures of one file, and a hundred of one view, made the lit file a hundred times as large.
+#[test]
+fn bytes_that_are_named_many_times_are_written_once() {
+    let mut json = source();
+    let views = json["bufferViews"].as_array_mut().unwrap();
+    let (first, picture) = (views.len(), json!({ "buffer": 0, "byteOffset": 0, "byteLength": 2000 }));
+    views.extend(vec![picture; 100]);
+    let mut images: Vec<Value> =
+        (0..100).map(|i| json!({ "bufferView": first + i, "mimeType": "image/png" })).collect();
+    images.extend(vec![json!({ "uri": "a.png" }); 100]);
+    json["images"] = images.into();
+    let files = Memory([("a.png".to_owned(), vec![1; 3000])].into());
+    let before = gltf::load("t.gltf", json.to_string().as_bytes(), &files, &LoadOptions::default()).unwrap();
+    let lit = halved(&before.scene, at_vertices);
+    let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &Style::Vertices).unwrap());
+    let (before, after) = (before.document.unwrap(), after.document.unwrap());
+    assert!(after.buffers[0].len() < 30_000, "{}", after.buffers[0].len());
+    assert_eq!(after.images.len(), 200);
+    for (before, after) in before.images.iter().zip(&after.images) {
+        assert_eq!(before.as_ref().unwrap().bytes, after.as_ref().unwrap().bytes);
+    }
+}
+
 #[test]
 fn a_file_is_written_whole_or_not_at_all() {
     let before = load(source().to_string().as_bytes());
