@@ -1,5 +1,8 @@
 //! `radiosity check`: what is in a scene, and every fault of it.
 
+mod flipped;
+mod overlap;
+
 use crate::input::{self, Input, SceneArguments};
 use crate::output::print;
 use crate::{Failure, Global};
@@ -27,7 +30,36 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<(), Failure> {
             "harmless for rooms with openings; in a solid it lets light in",
         );
     }
+    warn_of_flipped_faces(&mut input, &mesh);
+    warn_of_overlaps(&mut input, &mesh);
     if global.json { print(&describe(&input, open).to_string()) } else { print(&summary(&input)) }
+}
+
+fn warn_of_flipped_faces(input: &mut Input, mesh: &Mesh) {
+    for (object, count) in flipped::edges(&input.scene, mesh) {
+        let edges = if count == 1 { "1 edge lies" } else { &format!("{count} edges lie") };
+        input.faults.warning(
+            format!("{}: object '{}'", input.title, input.scene.objects[object].name),
+            format!("{edges} between faces that look opposite ways: one shows its black back beside the other's front"),
+            "turn the faces that look the wrong way ('recalculate normals'), or make the material two-sided",
+        );
+    }
+}
+
+fn warn_of_overlaps(input: &mut Input, mesh: &Mesh) {
+    let found = overlap::search(&input.scene, mesh);
+    let name = |object: usize| &input.scene.objects[object].name;
+    for (&object, &(count, on)) in &found.objects {
+        input.faults.warning(
+            format!("{}: object '{}'", input.title, name(object)),
+            format!("{count} triangles lie in one plane with object '{}', overlap it and face the same way", name(on)),
+            "which of the two is seen is chance: move one of them by a millimetre, or remove what is covered",
+        );
+    }
+    if found.more {
+        let what = "too many triangles lie in one place; overlapping surfaces were not all searched for";
+        input.faults.note(input.title.clone(), what, "");
+    }
 }
 
 /// Edges of the welded mesh that only one face has.

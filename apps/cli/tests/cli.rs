@@ -201,6 +201,63 @@ fn check_lists_what_is_there() {
     assert!(said.contains("38 triangles in 19 objects") && said.contains("4 materials"), "{said}");
 }
 
+#[test]
+fn check_finds_faces_that_look_the_wrong_way() {
+    let room = Room::new("check-flipped");
+    let corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n";
+    let sides = ["4 3 2 1", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"];
+    let write = |name: &str, sides: &[&str]| {
+        let faces: String = sides.iter().map(|side| format!("f {side}\n")).collect();
+        room.write(name, &format!("o cube\n{corners}{faces}"));
+    };
+    write("cube.obj", &sides);
+    let mut turned = sides;
+    turned[3] = "6 7 3 2";
+    write("turned.obj", &turned);
+    // A wall on the middle of the floor is nobody's neighbour.
+    room.write(
+        "wall.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nv 1 0 1\nv 1 1 1\n\
+        f 1 2 3 4\nf 2 5 6 3\nf 2 3 8 7\n",
+    );
+
+    let said = room.run(["check", "turned.obj"]).out;
+    assert!(
+        said.contains("warning: turned.obj: object 'cube': 4 edges lie between faces that look opposite"),
+        "{said}"
+    );
+    for good in [&["check", "cube.obj"][..], &["check", "wall.obj"], &["check", "turned.obj", "--obj-double-sided"]] {
+        let said = room.run(good).out;
+        assert!(!said.contains("warning"), "{said}");
+    }
+}
+
+#[test]
+fn check_finds_surfaces_in_one_plane() {
+    let room = Room::new("check-overlap");
+    let square = |first: usize, low: f64, high: f64, z: f64, up: bool| {
+        let corners = [[low, low], [high, low], [high, high], [low, high]].map(|[x, y]| format!("v {x} {y} {z}\n"));
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| first + if up { i } else { 3 - i });
+        format!("o s{first}\n{}f {a} {b} {c} {d}\n", corners.concat())
+    };
+    let floor = square(1, -3.1, 4.2, 0.0, true);
+    for (name, second, warns) in [
+        ("in.obj", square(5, 0.0, 1.0, 0.0, true), true),
+        ("across.obj", square(5, 4.0, 5.0, 0.0, true), true),
+        ("beside.obj", square(5, 4.2, 5.0, 0.0, true), false),
+        ("above.obj", square(5, 0.0, 1.0, 0.001, true), false),
+        ("under.obj", square(5, 0.0, 1.0, 0.0, false), false),
+        // Undersides on the floor that overlap one another.
+        ("both.obj", square(5, 0.0, 1.0, 0.0, false) + &square(9, 0.5, 2.0, 0.0, false), false),
+        ("free.obj", square(5, 0.0, 1.0, 2.0, false) + &square(9, 0.5, 2.0, 2.0, false), true),
+    ] {
+        room.write(name, &(floor.clone() + &second));
+        let said = room.run(["check", name]).out;
+        assert_eq!(said.contains("lie in one plane with object"), warns, "{said}");
+        assert_eq!(said.contains("warning"), warns, "{said}");
+    }
+}
+
 /// A triangle under a point light.
 const LAMP: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
 "extensionsUsed":["KHR_lights_punctual"],
