@@ -11,13 +11,16 @@ use std::collections::{BTreeMap, HashMap};
 /// (cosine of 0.8°).
 const FOLDED: f64 = 0.9999;
 
+/// Two faces of an edge, and whether each walks it from its lower to its higher vertex.
+type Faces = [(u32, bool); 2];
+
 /// How many edges of each object lie between two faces of it that look opposite ways.
 ///
 /// Faces of different objects are not compared: what touches need not belong together. Two-sided faces have no wrong
 /// way.
 pub fn edges(scene: &Scene, mesh: &Mesh) -> BTreeMap<usize, usize> {
     // The first two faces of each edge, by the direction in which they walk it, and how many there are.
-    let mut walked: HashMap<(u32, u32), ([(u32, bool); 2], u32)> = HashMap::new();
+    let mut walked: HashMap<(u32, u32), (Faces, u32)> = HashMap::new();
     for (t, corners) in mesh.triangles.iter().enumerate() {
         for i in 0..3 {
             let (a, b) = (corners[i], corners[(i + 1) % 3]);
