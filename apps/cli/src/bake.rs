@@ -80,7 +80,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
 
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");
-    let wants_view = arguments.image.is_some() || !arguments.report.is_empty() || arguments.unlit;
+    let is_json = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let wants_view = arguments.image.is_some() || arguments.unlit || !arguments.report.iter().all(is_json);
     let (width, height) = views::picture_size(&camera, arguments.picture.size);
     let options = RenderOptions { width, height, ..RenderOptions::default() };
     let look = || radiosity::render(&baked.solution, &baked.field, &camera, &options, progress);
@@ -125,7 +126,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let report =
         Report::new(&input, &mesh, &arguments.solve, (&baked, view.as_ref()), (&audit, lightmap), &files, progress);
     for path in &arguments.report {
-        let text = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+        let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,
             false => html::page(&report, &plates(view.as_ref(), &camera.name, &report, exposure)?),
         };

@@ -6,7 +6,6 @@ pub const UPPER: &str = "one-sided 95 % bound: with 95 % confidence the error is
 pub const LOWER: &str = "one-sided 95 % bound: with 95 % confidence the error is larger";
 pub const LOWER_IS_ZERO: &str = "one-sided 95 % bound: the audit cannot tell the error from none";
 pub const SOLUTION: &str = "the same for the solution, before it is written into texels or vertices";
-pub const FINER: &str = "more --texels-per-metre, or a smaller --element-size for light at vertices, keep more of it";
 pub const BIAS: &str = "mean difference over mean illuminance";
 
 pub const LEAST: &str = "the darkest element";

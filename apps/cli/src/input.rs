@@ -4,7 +4,7 @@ use crate::progress::Progress;
 use crate::{Failure, Global, numbers};
 use clap::Args;
 use radiosity::io::{Document, LoadOptions};
-use radiosity::{Faults, Scene, Severity, Sky, Up};
+use radiosity::{Faults, Material, Scene, Severity, Sky, Up};
 use std::path::{Path, PathBuf};
 
 /// The scene and how to read it.
@@ -152,11 +152,16 @@ pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
     if let Some(sky) = &arguments.sky {
         set_sky(&mut input.scene, sky)?;
     }
+    let scene = &input.scene;
+    if scene.lights.is_empty() && scene.sky.is_black() && !scene.materials.iter().any(Material::emits) {
+        input.faults.warning(input.title.clone(), "there is no light", "give it a sky, --sky overcast:10000, or lamps");
+    }
     Ok(input)
 }
 
 fn set_sky(scene: &mut Scene, text: &str) -> Result<(), Failure> {
-    let wrong = || Failure::input(format!("--sky {text}: use uniform:L, overcast:E or hdr:FILE"));
+    let wrong =
+        || Failure::input(format!("--sky {text}: use uniform:L or overcast:E, with a number from 0 on, or hdr:FILE"));
     let (kind, value) = text.split_once(':').ok_or_else(wrong)?;
     let number = || value.parse::<f32>().ok().filter(|x| x.is_finite() && *x >= 0.0).ok_or_else(wrong);
     match kind {

@@ -91,6 +91,8 @@ pub struct ErrorReport {
     pub solution_estimated: f64,
     /// Its one-sided 95 % bound from above.
     pub solution_upper_95_one_sided: f64,
+    /// How more of the solution would be kept where it is written.
+    pub finer: String,
 }
 
 impl ErrorReport {
@@ -110,6 +112,7 @@ impl ErrorReport {
             seed: solve.seed,
             solution_estimated: solution.error,
             solution_upper_95_one_sided: solution.upper,
+            finer: String::new(),
         }
     }
 
@@ -136,7 +139,7 @@ impl ErrorReport {
             format!("error asked {}: {verdict}; audit says {}, {bound}", percent(self.asked), percent(self.estimated));
         if self.is_lost_in_writing() {
             let within = percent(self.solution_upper_95_one_sided);
-            line += &format!("; the solution itself is within {within}: {}", figures::FINER);
+            line += &format!("; the solution itself is within {within}: {}", self.finer);
         }
         line
     }
@@ -230,6 +233,18 @@ impl Report {
         progress: &Progress,
     ) -> Report {
         let solution = &baked.solution;
+        let finer = match &lightmap {
+            Some(map) => format!(
+                "the lightmap has {:.1} texels per metre, try --texels-per-metre {:.0}",
+                map.density,
+                (2.0 * map.density).ceil()
+            ),
+            None => format!(
+                "vertices are {:.3} m apart, try --element-size {:.3}",
+                solution.element_size,
+                0.5 * solution.element_size
+            ),
+        };
         let lights = solution.luminaires.lights.iter().enumerate();
         let light = |(i, name): (usize, &str)| match name {
             "" => format!("light {i}"),
@@ -254,7 +269,7 @@ impl Report {
                 lights: lights.map(|(i, l)| light((i, l.name()))).collect(),
                 area: (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum(),
             },
-            error: ErrorReport::new(written, &baked.audit, solve),
+            error: ErrorReport { finer, ..ErrorReport::new(written, &baked.audit, solve) },
             illuminance,
             rounds: baked.rounds.clone(),
             balance,

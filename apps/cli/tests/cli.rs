@@ -226,8 +226,8 @@ fn check_finds_faces_that_look_the_wrong_way() {
         said.contains("warning: turned.obj: object 'cube': 4 edges lie between faces that look opposite"),
         "{said}"
     );
-    for good in [&["check", "cube.obj"][..], &["check", "wall.obj"], &["check", "turned.obj", "--obj-double-sided"]] {
-        let said = room.run(good).out;
+    for good in [&["cube.obj"][..], &["wall.obj"], &["turned.obj", "--obj-double-sided"]] {
+        let said = room.run([&["check", "--sky", "uniform:1"], good].concat()).out;
         assert!(!said.contains("warning"), "{said}");
     }
 }
@@ -252,10 +252,19 @@ fn check_finds_surfaces_in_one_plane() {
         ("free.obj", square(5, 0.0, 1.0, 2.0, false) + &square(9, 0.5, 2.0, 2.0, false), true),
     ] {
         room.write(name, &(floor.clone() + &second));
-        let said = room.run(["check", name]).out;
+        let said = room.run(["check", name, "--sky", "uniform:1"]).out;
         assert_eq!(said.contains("lie in one plane with object"), warns, "{said}");
         assert_eq!(said.contains("warning"), warns, "{said}");
     }
+}
+
+/// Most models from a library have no lamp: their first bake would be black without a word.
+#[test]
+fn the_lack_of_any_light_is_a_warning() {
+    let room = Room::new("no-light");
+    room.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert!(room.run(["check", "a.obj"]).out.contains("warning: a.obj: there is no light (give it a sky"));
+    assert!(!room.run(["check", "a.obj", "--sky", "overcast:1000"]).out.contains("no light"));
 }
 
 /// A triangle under a point light.

@@ -1,4 +1,4 @@
-//! Everything that comes in: glTF, OBJ, sky pictures, lists of points.
+//! Everything that comes in or goes out: glTF, OBJ, sky pictures, lists of points.
 //!
 //! Input is somebody else's data. Whatever the bytes, reading ends, takes no more memory than the bytes justify,
 //! opens nothing outside the folder of the file, and answers with a scene of finite numbers or with every fault found.

@@ -40,6 +40,9 @@ const LOOKED_UP_CELLS: usize = 50_000;
 /// Fewest pairs of estimates that an audit judges by.
 const LEAST_WATCHED: usize = 64;
 
+/// Up to how many times as many paths go to each point where points are few.
+const CLOSER: usize = 16;
+
 /// One round of refinement.
 #[derive(Clone, Debug, Serialize)]
 pub struct Round {
@@ -114,7 +117,9 @@ pub fn measure(
         watched.extend_from_within(..);
     }
     let mut auditor = Auditor::new(tracer, watched.iter().map(|&i| places[i]).collect(), options.seed);
-    let most_paths = most_paths(options.error);
+    // Few points can be looked at more closely for the same work.
+    let closer = (options.audit_points / watched.len().max(1)).clamp(1, CLOSER) as u32;
+    let most_paths = most_paths(options.error).saturating_mul(closer);
     let mut rounds = Vec::new();
     loop {
         let answer = solution.gathered(&places, gather, &shadowing, monitor)?;
@@ -129,6 +134,7 @@ pub fn measure(
             upper: audit.upper,
             seconds: start.elapsed().as_secs_f64(),
         });
+        monitor.note(&format!("error {:.2} %, at most {:.2} %", 100.0 * audit.error, 100.0 * audit.upper));
         let achieved = audit.upper <= options.error;
         // Rays alone did not do twice: smaller elements as well.
         let smaller = (rounds.len() % 2 == 0 && options.solve.element_size.is_none())

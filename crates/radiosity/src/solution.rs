@@ -287,8 +287,9 @@ impl<'a> Solution<'a> {
         let gathered = self.table.rows_mean(&self.values);
         for i in 0..n {
             for band in 0..3 {
-                self.indirect[i][band] = gathered[i][band];
-                self.irradiance[i][band] = direct[i][band] + gathered[i][band];
+                // Within its tolerance the solver may end a little below nothing.
+                self.indirect[i][band] = gathered[i][band].max(0.0);
+                self.irradiance[i][band] = direct[i][band] + self.indirect[i][band];
             }
         }
         Ok(())

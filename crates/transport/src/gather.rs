@@ -76,7 +76,7 @@ impl Gather<'_> {
                         let [u, v, x, y] = sequence.point(index);
                         let place = site.place(x, y);
                         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-                        let arriving = self.arriving(&place, direction, hash(seed ^ index));
+                        let arriving = self.arriving(&place, direction, hash(hash(seed) ^ index));
                         (0..3).for_each(|band| sum[band] += arriving[band]);
                     }
                     mean[half as usize] = sum.map(|s| (s / f64::from(half_rays)) as f32);

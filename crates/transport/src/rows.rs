@@ -78,7 +78,7 @@ fn trace_row(
     for half in 0..2 {
         for index in (0..to - from).map(|k| 2 * from + half * (to - from) + k) {
             let [u, v, mut x, mut y] = sequence.point(index);
-            let salt = hash(seed ^ index);
+            let salt = hash(hash(seed) ^ index);
             let mut id = ids.nothing();
             for attempt in 0..ATTEMPTS {
                 let place = site.place(x, y);

@@ -103,7 +103,7 @@ fn verdict(report: &Report) -> String {
         format!("; {} was asked.", percent(asked))
     } else if error.is_lost_in_writing() {
         let within = percent(error.solution_upper_95_one_sided);
-        format!("; {} was asked. The solution itself is within {within}: {}.", percent(asked), figures::FINER)
+        format!("; {} was asked. The solution itself is within {within}: {}.", percent(asked), error.finer)
     } else if bounded && error.estimated <= asked {
         format!(
             "; {} was asked. The estimate meets it, but a larger error cannot be excluded: allow more rounds.",

@@ -47,6 +47,7 @@ fn example(rounds: usize) -> Report {
             seed: 17,
             solution_estimated: 0.9 * estimated,
             solution_upper_95_one_sided: 0.9 * upper,
+            finer: "try more".to_owned(),
         },
         illuminance: Illuminance {
             least: 3.2,
