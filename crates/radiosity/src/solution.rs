@@ -377,7 +377,10 @@ impl<'a> Solution<'a> {
         let (first_sky, nothing) = (n as u32, (self.values.len() - 1) as u32);
         let radiosity = self.radiosity();
         let mut sums = [[0f64; 3]; 6];
-        let weight = self.exposed_area();
+        // A surface gives and takes as far as it is there.
+        let (scene, mesh) = (self.tracer.scene, self.tracer.mesh);
+        let there = |(e, area): (usize, f64)| area * f64::from(self.elements.opacity(scene, mesh, e as u32));
+        let weight: Vec<f64> = self.exposed_area().into_iter().enumerate().map(there).collect();
         for (i, w) in weight.iter().enumerate() {
             for (light, e) in self.luminaires.lights.iter().zip(self.columns.seen_by_light(i)) {
                 if matches!(light, radiosity_transport::Light::Point(_)) {

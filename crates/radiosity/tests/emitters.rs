@@ -67,14 +67,25 @@ fn surfaces_give_light_as_far_as_they_are_there() {
             let part = floor_light(&lamp_over_floor(alpha, AlphaMode::Blend, glow));
             for k in [used, 2] {
                 let share = part[k] / whole[k];
-                // Of 262,144 paths enough are stopped for 0.5 %. Rows whose elements have neighbouring
-                // numbers share the choices of what stops, some 1024 for each triangle of the lamp: 4 % at a quarter.
-                let tolerance = if k == 1 { 0.1 } else { 0.02 };
-                assert!((share / f64::from(alpha) - 1.0).abs() < tolerance, "{k}: {share} for {alpha}");
+                // Of 262,144 paths enough are stopped for 0.5 %; what stops a row's ray is chosen for each ray anew.
+                assert!((share / f64::from(alpha) - 1.0).abs() < 0.02, "{k}: {share} for {alpha}");
             }
             assert_eq!(part[unused], 0.0);
         }
     }
+}
+
+/// Light that enters leaves, also where surfaces let a part of it through.
+#[test]
+fn the_balance_closes_with_blended_surfaces() {
+    let mut scene = lamp_over_floor(0.5, AlphaMode::Blend, false);
+    scene.materials[0].base_color = [0.5, 0.5, 0.5, 1.0];
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let balance =
+        Solution::new(&tracer, &SolveOptions { rays: 512, ..SolveOptions::default() }, &()).unwrap().balance();
+    assert!((f64::from(balance.emitted[1]) / (0.5 * 1000.0 * PI) - 1.0).abs() < 1e-3, "{balance:?}");
+    assert!(balance.defect.iter().all(|d| d.abs() < 0.01), "{balance:?}");
 }
 
 /// Where the samples of an element met dark texels only, near rays of a gather added what the lamp gave already.

@@ -28,7 +28,7 @@ pub fn convergence(report: &Report) -> String {
         _ => plot::convergence(&report.rounds, report.error.asked) + &table(&head, &rows),
     };
     let words = note(
-        "Each round refines the answer and audits it again, until the upper bound (one-sided, 95 %) meets the asked \
+        "Each round refines the solution and audits it again (the verdict above is about the light as it is written), until the upper bound (one-sided, 95 %) meets the asked \
          error, or rounds or memory end. Both scales are logarithmic. A bound far above its estimate means that the \
          audit, not the answer, is coarse; an estimate of zero, drawn hollow on the lower edge, is below what the \
          audit can resolve.",
