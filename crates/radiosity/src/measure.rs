@@ -166,12 +166,13 @@ pub fn measure(
     }
 }
 
-/// A round that leaves more than this part of the error of the one before it is the last: what remains is not noise.
+/// Two rounds that leave more than this part of the error before them are the last: what remains is not noise. One
+/// alone may have had bad luck.
 const STALLED: f64 = 0.9;
 
-/// Whether the last round brought next to nothing.
+/// Whether the last two rounds brought next to nothing.
 pub(crate) fn is_stalled(rounds: &[Round]) -> bool {
-    matches!(rounds, [.., before, last] if last.error > STALLED * before.error)
+    matches!(rounds, [.., before, _, last] if last.error > STALLED * before.error)
 }
 
 /// Paths per estimate that an audit spends at most.

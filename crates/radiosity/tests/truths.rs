@@ -225,6 +225,113 @@ fn mean_irradiance_of_the_reference_scenes() {
     }
 }
 
+/// Points of a CIE 171 case by name, with what is expected there.
+fn named_points(case: &Value, results: &str) -> (Vec<(DVec3, DVec3)>, Vec<f64>) {
+    let points = case["given"]["points"].as_object().unwrap();
+    let places = points.values().map(|p| (point(&p["position"]), point(&p["normal"]))).collect();
+    (places, points.keys().map(|name| case["results"][results][name].as_f64().unwrap()).collect())
+}
+
+/// CIE 171:2006, 5.6 and 5.7: what a diffuse reflector gives to points beside it, free and behind a screen. What it
+/// reflects it may as well emit.
+#[test]
+fn cie_171_diffuse_reflectors() {
+    for id in ["cie-5.6-1", "cie-5.6-2", "cie-5.7-3"] {
+        let case = case("cie171", id);
+        let corners = |value: &Value| -> [DVec3; 4] {
+            let list: Vec<DVec3> = value.as_array().unwrap().iter().map(point).collect();
+            [list[0], list[1], list[2], list[3]]
+        };
+        let mut scene = Scene { up: Up::Z, ..Scene::default() };
+        scene.materials.push(matte("reflector", [0.0; 3], [1000.0; 3]));
+        scene.materials.push(Material { double_sided: true, ..matte("screen", [0.0; 3], [0.0; 3]) });
+        scene.add_quad("reflector", 0, corners(&case["given"]["reflector_polygon"]));
+        if !case["given"]["obstruction"].is_null() {
+            scene.add_quad("screen", 1, corners(&case["given"]["obstruction"]));
+        }
+        let (points, expected) = named_points(&case, "E_over_rhoE_reflector");
+        for (e, exact) in illuminance(&scene, &points, 0.01).iter().zip(&expected) {
+            // 1 % over all points together leaves faint ones more.
+            assert!((e / 1000.0 - exact).abs() < 0.03 * exact + 1e-9, "{id}: {e} for {exact}");
+        }
+    }
+}
+
+/// CIE 171:2006, 5.8: mean indirect illuminance of a cube with a point source, at reflectances up to 0.95.
+#[test]
+fn cie_171_cube_of_one_reflectance() {
+    let case = case("cie171", "cie-5.8-1");
+    let given = &case["given"];
+    let side = given["side"].as_f64().unwrap();
+    let expected = numbers(&case["results"]["mean_total_lx"]);
+    for (rho, exact) in numbers(&given["reflectance"]).iter().zip(expected) {
+        let mut scene = room(DVec3::splat(side), matte("wall", [*rho as f32; 3], [0.0; 3]));
+        scene.lights.push(PointLight {
+            name: String::new(),
+            kind: PointLightKind::Point,
+            position: DVec3::splat(0.5 * side),
+            direction: -DVec3::Z,
+            intensity: [(given["flux_lm"].as_f64().unwrap() / (4.0 * PI)) as f32; 3],
+            range: None,
+        });
+        let means = object_means(&scene, &SolveOptions { cells: 2000, ..SolveOptions::default() });
+        let mean = means.iter().map(|m| m[1]).sum::<f64>() / 6.0;
+        assert!((mean / exact - 1.0).abs() < 0.005, "{rho}: {mean} for {exact}");
+    }
+}
+
+/// A square about the vertical axis that faces up.
+fn square_at(half: f64, z: f64) -> [DVec3; 4] {
+    [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, y]| DVec3::new(x, y, z))
+}
+
+/// CIE 171:2006, 5.9, 5.11 and 5.13: the sky through an opening of the roof, of a wall, and under a mask.
+#[test]
+fn cie_171_sky_through_openings() {
+    for (id, results) in
+        [("cie-5.9-1", "sky_component_percent"), ("cie-5.11-5", "sky_component_percent"), ("cie-5.13-1", "SC_percent")]
+    {
+        let case = case("cie171", id);
+        let black = matte("black", [0.0; 3], [0.0; 3]);
+        let full = room(DVec3::new(4.0, 4.0, 3.0), black.clone());
+        let mut scene = Scene { up: Up::Z, sky: Sky::Uniform([1000.0; 3]), ..Scene::default() };
+        scene.materials = vec![black.clone(), Material { double_sided: true, ..black }];
+        let window: Vec<DVec3> = case["given"]["window_parallelogram"].as_array().unwrap().iter().map(point).collect();
+        let holed = if window[0].z == 3.0 { "ceiling" } else { "west" };
+        for object in full.objects.iter().filter(|o| o.name != holed) {
+            let triangles: Vec<_> = object.triangles.clone().map(|t| full.corners(t)).collect();
+            scene.add_triangles(&object.name, 0, &triangles);
+        }
+        // Four pieces around the opening, in coordinates along its edges.
+        let (u, v) = (window[1].normalize(), window[2].normalize());
+        let origin = window[0] - window[0].dot(u) * u - window[0].dot(v) * v;
+        let most = |axis: DVec3| if axis.z > 0.5 { 3.0 } else { 4.0 };
+        let [low, high] = [window[0], window[0] + window[1] + window[2]].map(|p| [p.dot(u), p.dot(v)]);
+        let bands = [
+            [0.0, 0.0, most(u), low[1]],
+            [0.0, high[1], most(u), most(v)],
+            [0.0, low[1], low[0], high[1]],
+            [high[0], low[1], most(u), high[1]],
+        ];
+        for [a, b, c, d] in bands {
+            let p = |x: f64, y: f64| origin + x * u + y * v;
+            scene.add_quad(holed, 1, [p(a, b), p(c, b), p(c, d), p(a, d)]);
+        }
+        if let Some(mask) = case["given"]["mask_polygon"].as_array() {
+            let p: Vec<DVec3> = mask.iter().map(point).collect();
+            scene.add_quad("mask", 1, [p[0], p[1], p[2], p[3]]);
+        }
+        // The sky is all around; what lies below the horizon is asked for apart.
+        scene.add_quad("ground", 1, square_at(2000.0, -0.1));
+        let (points, expected) = named_points(&case, results);
+        // A uniform sky of 1000 cd/m² gives 1000 π lx on the ground.
+        for (e, exact) in illuminance(&scene, &points, 0.01).iter().zip(&expected) {
+            let percent = e / (10.0 * PI);
+            assert!((percent - exact).abs() < 0.03 * exact + 0.02, "{id}: {percent} for {exact}");
+        }
+    }
+}
+
 /// CIE 171:2006, 5.2: a point source over a floor; catalogue 84, E = I cos θ/d².
 #[test]
 fn catalogue_84_point_source() {

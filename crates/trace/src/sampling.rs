@@ -111,12 +111,13 @@ pub fn unit(x: u32) -> f32 {
 pub struct Random(u64);
 
 impl Random {
-    /// The stream of a seed.
+    /// The stream of a seed. Seeds are mixed (Steele et al. 2014, SplitMix64): states that differ in their upper halves
+    /// only would make streams that follow each other.
     pub fn new(seed: u64) -> Random {
-        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x853c_49e6_748f_ea9b);
-        random.bits();
-        random.bits();
-        random
+        let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        Random(z ^ (z >> 31))
     }
 
     fn bits(&mut self) -> u32 {
