@@ -9,6 +9,7 @@ pub mod direct;
 pub mod exposure;
 pub mod gather;
 pub mod luminaires;
+mod one_light;
 pub mod polygon;
 pub mod receivers;
 pub mod rows;

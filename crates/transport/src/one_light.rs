@@ -1,0 +1,219 @@
+//! One light at one place: what it gives unshadowed, and what some shadow rays find of that.
+//!
+//! Estimators answer the irradiance in lux per band, and what became of their rays as bits.
+
+use crate::luminaires::Piece;
+use crate::polygon::{CosineTriangle, point_to_triangle};
+use glam::{DVec2, DVec3};
+use radiosity_scene::elements::triangle_from_square;
+use radiosity_scene::{Bands, PointLight, luminance};
+use radiosity_trace::sampling::{Sequence, hash};
+use radiosity_trace::{Place, Tracer};
+use std::f64::consts::PI;
+
+/// A shadow ray came through.
+pub const LIT: u8 = 1;
+/// A shadow ray was stopped.
+pub const DARK: u8 = 2;
+/// What was found would be noisy even if all shadow rays had come through.
+pub const CHANCE: u8 = 4;
+
+/// Added to the cosines by which pieces are picked: what faces away at its centre may still give a little.
+const GRAZING: f64 = 0.05;
+
+/// Luminance of a sum that is kept in double precision.
+pub fn luminance_of(e: [f64; 3]) -> f64 {
+    f64::from(luminance(e.map(|e| e as f32)))
+}
+
+/// Irradiance of a place from a source without area, and what became of the rays. There is one line of sight: `n` rays
+/// go along it only where surfaces may be partly transparent, which each decides anew.
+pub fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, n: u32, salt: u32) -> ([f64; 3], u8) {
+    let (direction, distance, arriving) = light.arrival(place.point);
+    let cosine = direction.dot(place.normal);
+    if cosine <= 0.0 || luminance(arriving) <= 0.0 {
+        return ([0.0; 3], 0);
+    }
+    let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
+    let ray = tracer.ray(place, direction, length);
+    let n = if tracer.is_opaque() { 1 } else { n };
+    let clear = (0..n).filter(|&i| length <= 0.0 || !tracer.blocked(&ray, salt ^ hash(i))).count();
+    let outcome = if clear > 0 { LIT } else { 0 } | if clear < n as usize { DARK } else { 0 };
+    (arriving.map(|e| f64::from(e) * cosine * clear as f64 / f64::from(n)), outcome)
+}
+
+/// Unshadowed irradiance of a place from a light of few triangles; `factors` gets the luminance of each one's part.
+pub fn unshadowed(pieces: &[Piece], place: &Place, factors: &mut [f64]) -> [f64; 3] {
+    let mut sum = [0f64; 3];
+    for (piece, out) in pieces.iter().zip(factors) {
+        *out = 0.0;
+        if piece.triangle != place.triangle {
+            let factor = point_to_triangle(place.point, place.normal, piece.corners);
+            (0..3).for_each(|band| sum[band] += factor * f64::from(piece.exitance[band]));
+            *out = factor * f64::from(luminance(piece.exitance));
+        }
+    }
+    sum
+}
+
+/// `n` samples from number `first` of a sequence on.
+pub type Samples<'s> = (&'s Sequence, u32, u32);
+
+/// Irradiance of a place from a light of few triangles: analytic value `here` times visible share; what became of
+/// the rays.
+pub fn from_few(
+    (pieces, factors): (&[Piece], &[f64]),
+    here: [f64; 3],
+    tracer: &Tracer,
+    place: &Place,
+    (sequence, first, n): Samples,
+    (ratio, salt): (u32, u32),
+) -> ([f64; 3], u8) {
+    let total: f64 = factors.iter().sum();
+    if total <= 0.0 {
+        return ([0.0; 3], 0);
+    }
+    let (mut visible, mut sampled) = ([0f64; 3], [0f64; 3]);
+    let mut outcome = 0;
+    for index in first..first + n {
+        let [u, v, _, _] = sequence.point(index);
+        // Pick a piece by its unshadowed contribution, stretching u, and a direction towards it.
+        let mut rest = f64::from(u) * total;
+        let mut k = 0;
+        while k + 1 < pieces.len() && (rest >= factors[k] || factors[k] <= 0.0) {
+            rest -= factors[k];
+            k += 1;
+        }
+        while factors[k] <= 0.0 && k > 0 {
+            k -= 1;
+            rest = factors[k];
+        }
+        let piece = &pieces[k];
+        let u = (rest / factors[k]).clamp(0.0, 1.0 - 1e-9);
+        let (target, weight) = sample_piece(piece, place, u, f64::from(v));
+        if weight <= 0.0 {
+            continue;
+        }
+        // The weight of this sample for a source of unit exitance, over the density of having taken it.
+        let weight = weight * total / factors[k];
+        let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
+        outcome |= if hidden { DARK } else { LIT };
+        let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
+        for band in 0..3 {
+            sampled[band] += weight * f64::from(piece.exitance[band]);
+            if !hidden {
+                visible[band] += weight * f64::from(tint[band]);
+            }
+        }
+    }
+    if n < ratio {
+        outcome |= CHANCE;
+    }
+    let irradiance = std::array::from_fn(|band| {
+        if n < ratio {
+            visible[band] / f64::from(n)
+        } else if sampled[band] > 0.0 {
+            here[band] * visible[band] / sampled[band]
+        } else {
+            0.0
+        }
+    });
+    (irradiance, outcome)
+}
+
+/// Appends the running sum of about what each piece gives to a place, ending at 1; answers the sum, lx.
+pub fn weigh(pieces: &[Piece], place: &Place, cumulative: &mut Vec<f64>) -> f64 {
+    let first = cumulative.len();
+    let mut sum = 0.0;
+    for piece in pieces {
+        let away = piece.corners.iter().sum::<DVec3>() / 3.0 - place.point;
+        let square = away.length_squared().max(piece.area);
+        let length = square.sqrt();
+        let cosines = [place.normal.dot(away), -piece.normal.dot(away)].map(|c| (c / length).max(0.0) + GRAZING);
+        let behind = (place.point - piece.corners[0]).dot(piece.normal) <= 0.0;
+        let below = piece.corners.iter().all(|c| (*c - place.point).dot(place.normal) <= 0.0);
+        if !behind && !below {
+            let shares = cosines[0] * cosines[1] / (PI * square);
+            sum += f64::from(luminance(piece.exitance)) * piece.area * shares;
+        }
+        cumulative.push(sum);
+    }
+    if sum > 0.0 {
+        cumulative[first..].iter_mut().for_each(|c| *c /= sum);
+    }
+    sum
+}
+
+/// Irradiance of a place from a light of many triangles: picked by the running sum of their shares, sampled by area.
+pub fn from_many(
+    (pieces, cumulative): (&[Piece], &[f64]),
+    tracer: &Tracer,
+    place: &Place,
+    (sequence, first, n): Samples,
+    salt: u32,
+) -> ([f64; 3], u8) {
+    let mut sum = [0f64; 3];
+    let mut outcome = 0;
+    for index in first..first + n {
+        let [u, v, _, _] = sequence.point(index);
+        let u = f64::from(u);
+        let k = cumulative.partition_point(|c| *c <= u).min(pieces.len() - 1);
+        let below = if k == 0 { 0.0 } else { cumulative[k - 1] };
+        let share = cumulative[k] - below;
+        let piece = &pieces[k];
+        let (p, q) = triangle_from_square(((u - below) / share).clamp(0.0, 1.0 - 1e-9), f64::from(v));
+        let [a, b, c] = piece.corners;
+        let target = Place { point: a + p * (b - a) + q * (c - a), normal: piece.normal, triangle: piece.triangle };
+        let weight = geometry(place, &target) * piece.area / share;
+        if weight <= 0.0 {
+            continue;
+        }
+        if tracer.mutually_visible(place, &target, salt ^ hash(index)) {
+            let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
+            (0..3).for_each(|band| sum[band] += weight * f64::from(tint[band]));
+            outcome |= LIT;
+        } else {
+            outcome |= DARK;
+        }
+    }
+    (sum.map(|s| s / f64::from(n)), outcome | CHANCE)
+}
+
+/// cos θ cos θ'/(π r²) of two places, 1/m².
+fn geometry(from: &Place, to: &Place) -> f64 {
+    let along = to.point - from.point;
+    let square = along.length_squared();
+    let cosines = along.dot(from.normal).max(0.0) * (-along.dot(to.normal)).max(0.0);
+    if square > 0.0 { cosines / (PI * square * square) } else { 0.0 }
+}
+
+/// A point of a piece and its weight: the form-factor density over the sampling density.
+fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
+    let [a, b, c] = piece.corners;
+    let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
+    // Far away the solid angle is too small for its own arithmetic, and area sampling is as good.
+    let distance = (a + b + c) / 3.0 - place.point;
+    if piece.area < 1e-3 * distance.length_squared() {
+        let (p, q) = triangle_from_square(x, y);
+        let target = seen(a + p * (b - a) + q * (c - a));
+        return (target, geometry(place, &target) * piece.area);
+    }
+    let Some(triangle) = CosineTriangle::new(place.point, place.normal, piece.corners) else {
+        return (seen(a), 0.0);
+    };
+    let (direction, weight) = triangle.direction(x, y);
+    let towards = -direction.dot(piece.normal);
+    if weight <= 0.0 || towards <= 0.0 {
+        return (seen(a), 0.0);
+    }
+    let reach = (place.point - a).dot(piece.normal) / towards;
+    (seen(place.point + reach * direction), weight)
+}
+
+/// Exitance of a piece at a point of it, where the emission is a picture.
+fn emission_at(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
+    let uv = tracer.mesh.barycentric(piece.triangle as usize, point).clamp(DVec2::ZERO, DVec2::ONE);
+    let at = tracer.mesh.surface(piece.triangle as usize, uv);
+    let opacity = tracer.scene.opacity(at);
+    tracer.scene.emitted_luminance(at).map(|l| opacity * l * std::f32::consts::PI)
+}
