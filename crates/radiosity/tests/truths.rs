@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec2};
 use radiosity::io::gltf_out::Light;
-use radiosity::transport::Shadowing;
+use radiosity::transport::{ElementReceivers, Exposure, HitTable, IdSpace, Shadowing};
 use radiosity::view::lightmap::look_up;
 use radiosity::{
-    BakeOptions, Material, MeasureOptions, Mesh, PointLight, PointLightKind, Scene, Sky, Solution, SolveOptions,
-    Tracer, Up, bake, lightmap, luminance, measure, vertex_light,
+    BakeOptions, Elements, Material, MeasureOptions, Mesh, PointLight, PointLightKind, Scene, Sky, SkyPatches,
+    Solution, SolveOptions, Tracer, Up, bake, lightmap, luminance, measure, vertex_light,
 };
 use serde_json::Value;
 
@@ -551,6 +551,52 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
         })
     };
     assert_eq!(run(1), run(2));
+}
+
+/// The rows of a box 1 × 2 × 10 seen from inside, the number of ids, and by element the area and the number of the face.
+fn rows_of_a_box(columns: usize) -> (HitTable, usize, Vec<f64>, Vec<usize>) {
+    let scene = room(DVec3::new(1.0, 2.0, 10.0), Material::default());
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let elements = Elements::new(&scene, &mesh, 0.5);
+    let all = 0..elements.len() as u32;
+    let area: Vec<f64> = all.clone().map(|e| elements.area(&mesh, e)).collect();
+    let ids = IdSpace { elements: &elements, sky: SkyPatches::new(&scene.sky, scene.up.direction()) };
+    let mut table = HitTable::new(area.clone(), &ids);
+    let exposure = Exposure::default();
+    let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+    table.extend(&tracer, &ids, &receivers, columns, &()).unwrap();
+    let face = |e: u32| scene.triangle_object[mesh.source[elements.place(e).0] as usize] as usize;
+    (table, ids.len(), area, all.map(face).collect())
+}
+
+/// Catalogue 8: A_i F_ij = A_j F_ji between faces of areas 1 : 10, each direction found by rays of its own; and the
+/// factors are the known ones (Howell, C-11, of the opposite faces 2 × 10 that are 1 apart: 0.573376).
+#[test]
+fn catalogue_8_reciprocity_between_unequal_faces() {
+    let (table, _, area, face) = rows_of_a_box(2048);
+    let mut flow = [[0f64; 6]; 6];
+    for (i, &from) in face.iter().enumerate() {
+        for id in table.row_ids(i) {
+            flow[from][face[id as usize]] += area[i] / 2048.0;
+        }
+    }
+    for (i, row) in flow.iter().enumerate() {
+        for (j, there) in row.iter().enumerate() {
+            let back = flow[j][i];
+            assert!((there - back).abs() < 0.01 * there.max(back) + 1e-3, "{i} {j}: {there} {back}");
+        }
+    }
+    // West and east are the last two faces of a room.
+    let opposite = flow[4][5] / 20.0;
+    assert!((opposite / 0.573_376 - 1.0).abs() < 0.005, "{opposite}");
+}
+
+/// Catalogue 0b, 35: every row sums to one, before any repair.
+#[test]
+fn catalogue_35_rows_sum_to_one() {
+    let (table, ids, _, _) = rows_of_a_box(64);
+    assert!(table.rows_mean(&vec![[1f32; 4]; ids]).iter().all(|sum| sum[0] == 1.0));
 }
 
 /// Catalogue 1: emitted = absorbed + escaped, as far as the rays can tell.
