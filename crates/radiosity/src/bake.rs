@@ -57,7 +57,7 @@ pub struct Baked<'a> {
     pub achieved: bool,
     /// The rounds.
     pub rounds: Vec<Round>,
-    /// Time by stage, over all rounds.
+    /// Time by stage, over all rounds and the audits of what was written.
     pub stages: Stages,
     /// The error asked.
     error: f64,
@@ -102,16 +102,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             (audit, gather) = (better, rays);
             rays *= 2;
         }
-        rounds.push(Round {
-            elements: solution.elements.len(),
-            rays: solution.rays(),
-            gather,
-            shadow_rays: shadowing.rays,
-            error: audit.error,
-            upper: audit.upper,
-            seconds: start.elapsed().as_secs_f64(),
-        });
-        monitor.note(&format!("error {:.2} %, at most {:.2} %", 100.0 * audit.error, 100.0 * audit.upper));
+        rounds.push(Round::new(&solution, gather, &shadowing, &audit, start));
+        monitor.note(&rounds[rounds.len() - 1].to_string());
         let achieved = audit.upper <= options.error;
         // More rounds only while there is something to gain, and memory and leave to gain it with.
         let smaller = solution.element_size / std::f64::consts::SQRT_2;
@@ -166,8 +158,7 @@ impl Baked<'_> {
     /// [`Error::Stopped`].
     pub fn judge(&self, monitor: &dyn Monitor, read: impl Fn(&Station) -> Bands) -> Result<Audit, Error> {
         let read: Vec<Bands> = self.watched.iter().map(read).collect();
-        let most_paths = most_paths(self.error);
-        certify(&mut self.auditor.clone(), &read, self.error, most_paths, &Stages::default(), monitor)
+        certify(&mut self.auditor.clone(), &read, self.error, most_paths(self.error), &self.stages, monitor)
     }
 
     /// The places of the audit.

@@ -32,7 +32,7 @@ pub struct Lightmap {
     pub texels: usize,
     /// What the referee says of the texels as a viewer reads them, before they are stored in 8 bits.
     pub audit: Audit,
-    /// Largest difference across seams, root mean square, before and after fitting them, lx.
+    /// Root mean square difference across seams, before and after fitting them, lx.
     pub seams: [f64; 2],
 }
 

@@ -62,6 +62,33 @@ pub struct Round {
     pub seconds: f64,
 }
 
+impl Round {
+    /// What has been done since `start`, and what came of it.
+    pub(crate) fn new(
+        solution: &Solution,
+        gather: usize,
+        shadowing: &Shadowing,
+        audit: &Audit,
+        start: std::time::Instant,
+    ) -> Round {
+        Round {
+            elements: solution.elements.len(),
+            rays: solution.rays(),
+            gather,
+            shadow_rays: shadowing.rays,
+            error: audit.error,
+            upper: audit.upper,
+            seconds: start.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+impl std::fmt::Display for Round {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "error {:.2} %, at most {:.2} %", 100.0 * self.error, 100.0 * self.upper)
+    }
+}
+
 /// Irradiance at points, and how far to trust it.
 #[derive(Clone, Debug)]
 pub struct Measurement {
@@ -125,16 +152,8 @@ pub fn measure(
         let answer = solution.gathered(&places, gather, &shadowing, monitor)?;
         let watched: Vec<Bands> = watched.iter().map(|&i| answer.irradiance[i]).collect();
         let audit = certify(&mut auditor, &watched, options.error, most_paths, &stages, monitor)?;
-        rounds.push(Round {
-            elements: solution.elements.len(),
-            rays: solution.rays(),
-            gather,
-            shadow_rays: shadowing.rays,
-            error: audit.error,
-            upper: audit.upper,
-            seconds: start.elapsed().as_secs_f64(),
-        });
-        monitor.note(&format!("error {:.2} %, at most {:.2} %", 100.0 * audit.error, 100.0 * audit.upper));
+        rounds.push(Round::new(&solution, gather, &shadowing, &audit, start));
+        monitor.note(&rounds[rounds.len() - 1].to_string());
         let achieved = audit.upper <= options.error;
         // Rays alone did not do twice: smaller elements as well.
         let smaller = (rounds.len() % 2 == 0 && options.solve.element_size.is_none())

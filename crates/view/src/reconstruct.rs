@@ -36,7 +36,7 @@ fn corner(i: u32, j: u32, k: u32) -> usize {
 
 /// How far corners on the border of a smooth surface are moved towards what keeps the means of the cells: there all cells
 /// lie to one side, and their mean is the value a third of a cell further in. 1.8 is exact where light is linear and the
-/// border straight, and takes the noise along; on the Cornell box 1.5 leaves the least error.
+/// border straight, and takes the noise along. 1.5 leaves 0.80 % of error in the Cornell box where none leaves 0.86 % (128 rays).
 const BORDER: f64 = 1.5;
 
 /// A corner on the border is not moved to less than this part of its mean, nor by more than to twice of it.
@@ -193,11 +193,11 @@ struct Cell {
 
 impl Cell {
     /// The means over the exposed part of each cell's elements.
-    fn all(elements: &Elements, value: impl Fn(usize) -> Bands, weight: &[f64]) -> Vec<Cell> {
+    fn all(elements: &Elements, values: &[Bands], weight: &[f64]) -> Vec<Cell> {
         let cell = |cell: usize| {
             let mut mean = Cell::default();
             for element in elements.of_cell(cell).map(|e| e as usize) {
-                let (weight, value) = (weight[element], value(element));
+                let (weight, value) = (weight[element], values[element]);
                 mean.weight += weight;
                 (0..3).for_each(|band| mean.value[band] += weight * f64::from(value[band]));
             }
@@ -226,7 +226,7 @@ impl Field {
     /// that are buried and must not darken their neighbours.
     pub fn new(mesh: &Mesh, elements: &Elements, values: &[Bands], weight: &[f64]) -> Field {
         let corners = Corners::new(mesh, elements);
-        let values = corners.fitted(&Cell::all(elements, |e| values[e], weight));
+        let values = corners.fitted(&Cell::all(elements, values, weight));
         Field { base: corners.base, division: corners.division, values }
     }
 
