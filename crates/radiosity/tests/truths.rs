@@ -10,6 +10,9 @@ use radiosity::{
 };
 use serde_json::Value;
 
+#[path = "truths/closed_forms.rs"]
+mod closed_forms;
+
 const PI: f64 = std::f64::consts::PI;
 
 fn truths(name: &str) -> Value {

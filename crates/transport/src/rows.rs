@@ -3,9 +3,10 @@
 //! Receiver i sends M cosine-distributed rays (Malley 1988) from stratified points on itself; entry (i, m) is the id of
 //! what ray m met: an element, a sky patch, or nothing. Each entry weighs 1/M, so a row sums to exactly one and energy
 //! cannot appear. The rays of a row are the two halves of one scrambled sequence. Half their difference is the standard
-//! error of the row, live and for any right-hand side, and on the safe side: 1.2 to 1.35 times the true one in the
+//! error of the row, live and for any right-hand side, and on the safe side: 1.15 to 1.4 times the true one in the
 //! Cornell box, as the halves complement each other (independent ones would leave 15 % more noise). Doubling M appends
-//! columns to the table; nothing is traced twice. The elements of a divided cell share its M rays: a receiver sees many of them and averages their noise out.
+//! columns to the table; nothing is traced twice. The elements of a divided cell share its M rays: a receiver sees many
+//! of them and averages their noise out.
 //! It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
 
 use crate::{Progress, Receivers, Stopped};
