@@ -235,7 +235,9 @@ impl<'a> Solution<'a> {
         let ids = IdSpace { elements: &self.elements, sky: self.sky };
         let receivers = ElementReceivers { mesh, elements: &self.elements, exposure: &self.exposure };
         let table = &mut self.table;
-        self.stages.time(monitor, "rays", || table.extend(self.tracer, &ids, &receivers, rays, &watch))?;
+        let scene_sky = &self.tracer.scene.sky;
+        let sky = if scene_sky.is_black() { Vec::new() } else { self.sky.radiosity(scene_sky) };
+        self.stages.time(monitor, "rays", || table.extend(self.tracer, (&ids, &sky), &receivers, rays, &watch))?;
         let started = std::time::Instant::now();
         monitor.stage("solve");
         self.solve(monitor)?;
@@ -245,21 +247,15 @@ impl<'a> Solution<'a> {
 
     fn solve(&mut self, monitor: &dyn Monitor) -> Result<(), Error> {
         let n = self.elements.len();
-        // The known part: direct light and what the sky gives through the rows.
-        let mut sky_only = self.values.clone();
-        sky_only[..n].fill([0.0; 4]);
-        let known: Vec<Bands> = if self.tracer.scene.sky.is_black() {
-            vec![[0.0; 3]; n]
-        } else {
-            self.table.rows_mean(&sky_only).into_iter().map(|h| [h[0], h[1], h[2]]).collect()
-        };
+        // The known part: direct light and what the sky gives.
+        let daylight = self.daylight();
         let direct = self.direct();
         let mut e = vec![0.0; 3 * n];
         for i in 0..n {
             let seen = self.columns.seen(i);
             for band in 0..3 {
                 let own = f64::from(self.exitance[i][band] - self.luminaires.promoted[i][band]);
-                let arriving = f64::from(seen[band]) + f64::from(known[i][band]);
+                let arriving = f64::from(seen[band]) + f64::from(daylight[i][band]);
                 e[3 * i + band] = own + f64::from(self.reflectance[i][band]) * arriving;
             }
         }
@@ -284,15 +280,28 @@ impl<'a> Solution<'a> {
         for (value, x) in self.values.iter_mut().zip(x.chunks_exact(3)) {
             *value = [x[0] as f32, x[1] as f32, x[2] as f32, 0.0];
         }
-        let gathered = self.table.rows_mean(&self.values);
+        let gathered = self.table.rows_mean(&self.of_elements());
         for i in 0..n {
             for band in 0..3 {
                 // Within its tolerance the solver may end a little below nothing.
-                self.indirect[i][band] = gathered[i][band].max(0.0);
+                self.indirect[i][band] = (daylight[i][band] + gathered[i][band]).max(0.0);
                 self.irradiance[i][band] = direct[i][band] + self.indirect[i][band];
             }
         }
         Ok(())
+    }
+
+    /// X by id, the sky's set to nothing.
+    fn of_elements(&self) -> Vec<[f32; 4]> {
+        let mut values = self.values.clone();
+        values[self.elements.len()..].fill([0.0; 4]);
+        values
+    }
+
+    /// Irradiance of each element by the sky, unreflected.
+    fn daylight(&self) -> Vec<Bands> {
+        let mean = |[a, b]: &[Bands; 2]| std::array::from_fn(|band| 0.5 * (a[band] + b[band]));
+        self.table.daylight().iter().map(mean).collect()
     }
 
     /// Direct irradiance of all lights together, by element.
@@ -343,7 +352,8 @@ impl<'a> Solution<'a> {
     /// irradiance E, as the eye takes it, and by the weight E/(E + mean E), so that neither the dark insides of furniture
     /// nor a bright garden decide.
     pub fn row_noise(&self) -> f64 {
-        let halves = self.table.halves(&self.values);
+        let halves = self.table.halves(&self.of_elements());
+        let daylight = self.table.daylight();
         let weight = self.exposed_area();
         let y = |e: usize| f64::from(luminance(self.irradiance[e]));
         let mean = weight.iter().enumerate().map(|(e, w)| w * y(e)).sum::<f64>()
@@ -352,7 +362,11 @@ impl<'a> Solution<'a> {
         for cell in 0..self.elements.cells() {
             let (mut difference, mut flux, mut exposed) = (0.0, 0.0, 0.0);
             for e in self.elements.of_cell(cell).map(|e| e as usize) {
-                let [a, b] = halves[e].map(|v| f64::from(luminance([v[0], v[1], v[2]])));
+                let half = |k: usize| {
+                    let [r, g, b, _] = halves[e][k];
+                    f64::from(luminance([r, g, b])) + f64::from(luminance(daylight[e][k]))
+                };
+                let (a, b) = (half(0), half(1));
                 difference += weight[e] * 0.5 * (a - b);
                 flux += weight[e] * y(e);
                 exposed += weight[e];
@@ -401,9 +415,7 @@ impl<'a> Solution<'a> {
                 [f64::from(sky) / m, f64::from(back) / m]
             })
             .collect();
-        let mut sky_only = self.values.clone();
-        sky_only[..n].fill([0.0; 4]);
-        let from_sky = self.table.rows_mean(&sky_only);
+        let from_sky = self.daylight();
         for i in 0..n {
             for band in 0..3 {
                 let (rho, e) = (f64::from(self.reflectance[i][band]), f64::from(self.irradiance[i][band]));

@@ -568,7 +568,7 @@ fn rows_of_a_box(columns: usize) -> (HitTable, usize, Vec<f64>, Vec<usize>) {
     let mut table = HitTable::new(area.clone(), &ids);
     let exposure = Exposure::default();
     let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
-    table.extend(&tracer, &ids, &receivers, columns, &()).unwrap();
+    table.extend(&tracer, (&ids, &[]), &receivers, columns, &()).unwrap();
     let face = |e: u32| scene.triangle_object[mesh.source[elements.place(e).0] as usize] as usize;
     (table, ids.len(), area, all.map(face).collect())
 }

@@ -74,11 +74,11 @@ fn stages(c: &mut Criterion) {
     group.throughput(Throughput::Elements((n * RAYS) as u64));
     let empty = || HitTable::new(area.clone(), &ids);
     group.bench_function(format!("rows, {RAYS} rays"), |b| {
-        let trace = |mut table: HitTable| table.extend(&tracer, &ids, &receivers, RAYS, &()).map(|()| table);
+        let trace = |mut table: HitTable| table.extend(&tracer, (&ids, &[]), &receivers, RAYS, &()).map(|()| table);
         b.iter_batched(empty, trace, BatchSize::PerIteration);
     });
     let mut table = empty();
-    table.extend(&tracer, &ids, &receivers, RAYS, &()).unwrap();
+    table.extend(&tracer, (&ids, &[]), &receivers, RAYS, &()).unwrap();
     let radiosity: Vec<f64> = (0..3 * n).map(|i| (i % 17) as f64).collect();
     let mut irradiance = vec![0.0; 3 * n];
     group.bench_function("sweep over the table, three bands", |b| {

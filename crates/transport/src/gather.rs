@@ -5,6 +5,8 @@
 //! seen: there the ray goes on as a path — one light sample, one more ray — and so contacts, shelves and corners are
 //! resolved below the size of the elements.
 
+use crate::daylight::{DAYLIGHT, Escapes};
+use crate::receivers::Site;
 use crate::rows::IdSpace;
 use crate::{Columns, Luminaires, Progress, Receivers, Stopped};
 use glam::{DVec2, DVec3};
@@ -48,6 +50,14 @@ pub struct Gather<'a> {
     pub area: &'a [f64],
 }
 
+/// What a ray brings.
+enum Arriving {
+    /// Radiosity of surfaces, and of the sky by way of them.
+    Reflected([f64; 3]),
+    /// Radiosity of the sky, seen directly.
+    Sky(Bands),
+}
+
 impl Gather<'_> {
     /// Mean incoming radiosity at each receiver over `rays` rays, as two halves: its indirect irradiance.
     ///
@@ -65,21 +75,45 @@ impl Gather<'_> {
         let done = AtomicUsize::new(0);
         let mut means = vec![[[0f32; 3]; 2]; n];
         means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
-            for (k, mean) in means.iter_mut().enumerate() {
+            let mut escapes = Escapes::default();
+            let black = self.tracer.scene.sky.is_black();
+            escapes.begin(means.len(), if black { 0 } else { 2 * half_rays });
+            let ray = |site: &Site, frame: &[DVec3; 3], [u, v, x, y]: [f32; 4]| {
+                (site.place(x, y), cosine_direction(frame, f64::from(u), f64::from(v)))
+            };
+            let own = |k: usize| {
                 let i = chunk * CHUNK + k;
-                let Some(site) = receivers.site(i) else { continue };
-                let (seed, frame) = (receivers.seed(i), frame(site.normal));
+                receivers.site(i).map(|site| (receivers.seed(i), frame(site.normal), site))
+            };
+            for (k, mean) in means.iter_mut().enumerate() {
+                let Some((seed, frame, site)) = own(k) else { continue };
                 let sequence = Sequence::new(seed, GATHER);
+                escapes.place(k, &site, 2 * half_rays);
                 for half in 0..2 {
                     let mut sum = [0f64; 3];
                     for index in half * half_rays..(half + 1) * half_rays {
-                        let [u, v, x, y] = sequence.point(index);
-                        let place = site.place(x, y);
-                        let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-                        let arriving = self.arriving(&place, direction, hash(hash(seed) ^ index));
-                        (0..3).for_each(|band| sum[band] += arriving[band]);
+                        let point = sequence.point(index);
+                        let (place, direction) = ray(&site, &frame, point);
+                        match self.arriving(&place, direction, hash(hash(seed) ^ index)) {
+                            Arriving::Reflected(light) => (0..3).for_each(|band| sum[band] += light[band]),
+                            Arriving::Sky(light) => escapes.add(k, half as usize, point, light),
+                        }
                     }
                     mean[half as usize] = sum.map(|s| (s / f64::from(half_rays)) as f32);
+                }
+            }
+            for (k, mean) in means.iter_mut().enumerate().filter(|_| !black) {
+                let Some((seed, frame, site)) = own(k) else { continue };
+                let daylight = escapes.mean(k, (&Sequence::new(seed, DAYLIGHT), 0), |index, point| {
+                    let (place, direction) = ray(&site, &frame, point);
+                    let salt = hash(hash(seed ^ DAYLIGHT) ^ index);
+                    match self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), salt) {
+                        Found::Escaped => self.sky(self.ids.id(Found::Escaped, direction)),
+                        _ => Default::default(),
+                    }
+                });
+                for (mean, sky) in mean.iter_mut().flatten().zip(daylight.as_flattened()) {
+                    *mean += sky;
                 }
             }
             let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
@@ -88,13 +122,22 @@ impl Gather<'_> {
         Ok(means)
     }
 
+    /// Radiosity π L of the sky patch with an id, lm/m² per band.
+    fn sky(&self, id: u32) -> Bands {
+        let [r, g, b, _] = self.values[id as usize];
+        [r, g, b]
+    }
+
     /// Radiosity that arrives at a place from a direction, without that of the luminaires.
-    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32) -> [f64; 3] {
+    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32) -> Arriving {
         let (mut place, mut direction) = (*from, direction);
         let (mut sum, mut throughput) = ([0f64; 3], [1f64; 3]);
         for bounce in 0.. {
             let found = self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), seed);
             let id = self.ids.id(found, direction);
+            if bounce == 0 && found == Found::Escaped {
+                return Arriving::Sky(self.sky(id));
+            }
             let near = match found {
                 Found::Surface { triangle, uv, side, distance } if bounce < DEEPEST && id != self.ids.nothing() => {
                     let near = f64::from(distance) < near(self.area[id as usize]);
@@ -105,7 +148,7 @@ impl Gather<'_> {
             let Some((triangle, uv, side)) = near else {
                 let value = self.values[id as usize];
                 (0..3).for_each(|band| sum[band] += throughput[band] * f64::from(value[band]));
-                return sum;
+                return Arriving::Reflected(sum);
             };
 
             // Go on as a path from the very spot.
@@ -127,7 +170,7 @@ impl Gather<'_> {
             let reflectance = scene.reflectance(at);
             (0..3).for_each(|band| throughput[band] *= f64::from(reflectance[band]));
             if throughput.iter().all(|t| *t <= 0.0) {
-                return sum;
+                return Arriving::Reflected(sum);
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
             let direct = self.one_light(&spot, id as usize, seed);
@@ -136,7 +179,7 @@ impl Gather<'_> {
             direction = cosine_direction(&frame(spot.normal), u, v);
             place = spot;
         }
-        sum
+        Arriving::Reflected(sum)
     }
 
     /// Direct irradiance at a spot of an element, by one light picked after what the element received.

@@ -5,6 +5,7 @@
 //! through rows: [`Luminaires`] gives their light as a direct column each. Receivers are elements while the equation
 //! is solved and points when an answer is read; both go through the same code ([`Receivers`]).
 
+mod daylight;
 pub mod direct;
 pub mod exposure;
 pub mod gather;

@@ -47,6 +47,11 @@ impl Site {
         }
     }
 
+    /// The mesh triangle that it lies on; no number of one for places in the open.
+    pub fn triangle(&self) -> u32 {
+        self.triangle
+    }
+
     /// The place that (x, y) in the unit square maps to.
     #[inline]
     pub fn place(&self, x: f32, y: f32) -> Place {

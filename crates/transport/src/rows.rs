@@ -9,8 +9,11 @@
 //! of them and averages their noise out.
 //! It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
 
+use crate::daylight::{DAYLIGHT, Escapes};
+use crate::receivers::Site;
 use crate::{Progress, Receivers, Stopped};
-use radiosity_scene::{Elements, SkyPatches};
+use glam::DVec3;
+use radiosity_scene::{Bands, Elements, SkyPatches};
 use radiosity_solve::{AreaSpace, Transport};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Found, Tracer};
@@ -45,7 +48,7 @@ impl IdSpace<'_> {
 
     /// The id of what a ray found.
     #[inline]
-    pub fn id(&self, found: Found, direction: glam::DVec3) -> u32 {
+    pub fn id(&self, found: Found, direction: DVec3) -> u32 {
         match found {
             Found::Surface { triangle, uv: [u, v], side, .. } => {
                 self.elements.at(triangle, u, v, side).unwrap_or(self.nothing())
@@ -60,41 +63,64 @@ impl IdSpace<'_> {
 /// known to the exposure mask, so each attempt succeeds with probability 1/2 or more.
 const ATTEMPTS: u32 = 8;
 
-/// Rays `2 from..2 to` of a receiver's row, in two halves; `out` gets the ids of the first half, then of the second.
-fn trace_row(
-    tracer: &Tracer,
-    ids: &IdSpace,
-    receivers: &impl Receivers,
-    i: usize,
-    (from, to, stream): (u32, u32, u32),
-    mut out: impl FnMut(usize, u32),
-) {
-    let seed = receivers.seed(i);
-    let Some(site) = receivers.site(i) else {
-        (from..to).for_each(|_| (0..2).for_each(|half| out(half, ids.nothing())));
-        return;
-    };
-    let frame = frame(site.normal);
-    let sequence = Sequence::new(seed, stream);
-    for half in 0..2 {
-        for index in (0..to - from).map(|k| 2 * from + half * (to - from) + k) {
-            let [u, v, mut x, mut y] = sequence.point(index);
-            let salt = hash(hash(seed) ^ index);
-            let mut id = ids.nothing();
-            for attempt in 0..ATTEMPTS {
-                let place = site.place(x, y);
-                let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-                let found = tracer.first(&tracer.ray(&place, direction, f64::INFINITY), salt);
-                id = ids.id(found, direction);
-                if found != Found::Back || !receivers.buried(tracer, &place, salt) {
-                    break;
-                }
-                // The place lies inside a solid: the same direction from another place of the receiver.
-                let again = hash(salt ^ attempt);
-                (x, y) = (unit(again), unit(hash(again)));
+/// Who casts the rays of rows.
+struct Caster<'a, R> {
+    tracer: &'a Tracer<'a>,
+    ids: &'a IdSpace<'a>,
+    /// Radiosity of the sky patches; none where the sky is black.
+    sky: &'a [Bands],
+    receivers: &'a R,
+}
+
+impl<R: Receivers> Caster<'_, R> {
+    /// The id of what a ray meets that point (u, v, x, y) of a sequence sends from a receiver.
+    fn cast(&self, site: &Site, frame: &[DVec3; 3], [u, v, mut x, mut y]: [f32; 4], salt: u32) -> u32 {
+        let direction = cosine_direction(frame, f64::from(u), f64::from(v));
+        let mut id = self.ids.nothing();
+        for attempt in 0..ATTEMPTS {
+            let place = site.place(x, y);
+            let found = self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), salt);
+            id = self.ids.id(found, direction);
+            if found != Found::Back || !self.receivers.buried(self.tracer, &place, salt) {
+                break;
             }
-            out(half as usize, id);
+            // The place lies inside a solid: the same direction from another place of the receiver.
+            let again = hash(salt ^ attempt);
+            (x, y) = (unit(again), unit(hash(again)));
         }
+        id
+    }
+
+    /// Radiosity of the sky patch with an id; `None` for what is not sky.
+    fn light(&self, id: u32) -> Option<Bands> {
+        self.sky.get((id as usize).checked_sub(self.ids.elements.len())?).copied()
+    }
+
+    /// Rays `2 from..2 to` of receiver i, in two halves, which are those of `row`; what escapes goes to receiver k there.
+    fn trace(&self, (i, from): (usize, u32), row: &mut [u32], k: usize, escapes: &mut Escapes) {
+        let Some(site) = self.receivers.site(i) else { return row.fill(self.ids.nothing()) };
+        let (seed, frame) = (self.receivers.seed(i), frame(site.normal));
+        let sequence = Sequence::new(seed, ROWS);
+        escapes.place(k, &site, row.len() as u32);
+        let half = row.len() / 2;
+        for (m, id) in row.iter_mut().enumerate() {
+            let index = 2 * from + m as u32;
+            let point = sequence.point(index);
+            *id = self.cast(&site, &frame, point, hash(hash(seed) ^ index));
+            if let Some(light) = self.light(*id) {
+                escapes.add(k, m / half, point, light);
+            }
+        }
+    }
+
+    /// Mean radiosity of the sky over the hemisphere of receiver i, k there, as two halves.
+    fn daylight(&self, (i, from): (usize, u32), k: usize, escapes: &mut Escapes) -> [Bands; 2] {
+        let Some(site) = self.receivers.site(i) else { return Default::default() };
+        let (seed, frame) = (self.receivers.seed(i), frame(site.normal));
+        escapes.mean(k, (&Sequence::new(seed, DAYLIGHT), 2 * from), |index, point| {
+            let id = self.cast(&site, &frame, point, hash(hash(seed ^ DAYLIGHT) ^ index));
+            self.light(id).unwrap_or_default()
+        })
     }
 }
 
@@ -127,6 +153,8 @@ pub struct HitTable {
     all_ids: usize,
     /// Rays of each element so far.
     traced: Vec<u32>,
+    /// Mean radiosity of the sky over each element's hemisphere, as two halves: what it gives unreflected, lux per band.
+    daylight: Vec<[Bands; 2]>,
     /// Label of each element: elements that see each other, directly or through others, share one.
     parts: Vec<u32>,
 }
@@ -140,7 +168,15 @@ impl HitTable {
         let n = area.len();
         let parts = (0..n as u32).collect();
         let traced = vec![0; n];
-        HitTable { space: AreaSpace { area }, blocks: Vec::new(), columns: 0, all_ids: ids.len(), traced, parts }
+        HitTable {
+            space: AreaSpace { area },
+            blocks: Vec::new(),
+            columns: 0,
+            all_ids: ids.len(),
+            traced,
+            daylight: vec![Default::default(); n],
+            parts,
+        }
     }
 
     /// M: rays per cell so far.
@@ -148,19 +184,25 @@ impl HitTable {
         self.columns
     }
 
+    /// Irradiance of each element by the sky, unreflected, as two halves: lux per band.
+    pub fn daylight(&self) -> &[[Bands; 2]] {
+        &self.daylight
+    }
+
     /// Bytes of the table with `columns` rays for each of `cells`.
     pub fn bytes(cells: usize, columns: usize) -> usize {
         cells * columns * size_of::<u32>()
     }
 
-    /// Appends columns up to `columns` rays per cell (an even number).
+    /// Appends columns up to `columns` rays per cell (an even number). `sky` has the radiosity π L of the sky patches;
+    /// nothing where the sky is black.
     ///
     /// # Errors
     /// [`Stopped`] if `progress` says so; the table is then as it was.
     pub fn extend(
         &mut self,
         tracer: &Tracer,
-        ids: &IdSpace,
+        (ids, sky): (&IdSpace, &[Bands]),
         receivers: &impl Receivers,
         columns: usize,
         progress: &impl Progress,
@@ -179,25 +221,36 @@ impl HitTable {
         starts.push(end);
         let mut block = Block { starts, ids: vec![0u32; end] };
         let done = AtomicUsize::new(0);
-        split_rows(&mut block.ids, &block.starts, CHUNK).into_par_iter().try_for_each(|(rows, mut ids_left)| {
-            for i in rows.clone() {
+        let mut daylight = vec![[[0f32; 3]; 2]; n];
+        let caster = Caster { tracer, ids, sky, receivers };
+        let chunks = split_rows(&mut block.ids, &block.starts, CHUNK).into_par_iter();
+        chunks.zip(daylight.par_chunks_mut(CHUNK)).try_for_each(|((rows, mut ids_left), daylight)| {
+            let mut escapes = Escapes::default();
+            escapes.begin(rows.len(), if sky.is_empty() { 0 } else { more as u32 });
+            for (k, i) in rows.clone().enumerate() {
                 let row;
                 (row, ids_left) = ids_left.split_at_mut(block.starts[i + 1] - block.starts[i]);
-                let half = row.len() / 2;
-                let (from, mut next) = (self.traced[i] / 2, [0, half]);
-                trace_row(tracer, ids, receivers, i, (from, from + half as u32, ROWS), |half, id| {
-                    row[next[half]] = id;
-                    next[half] += 1;
-                });
+                caster.trace((i, self.traced[i] / 2), row, k, &mut escapes);
                 // Neighbouring ids lie in the same cache lines when the row is read back in order.
+                let half = row.len() / 2;
                 row[..half].sort_unstable();
                 row[half..].sort_unstable();
+            }
+            if !sky.is_empty() {
+                for (k, (i, daylight)) in rows.clone().zip(daylight).enumerate() {
+                    *daylight = caster.daylight((i, self.traced[i] / 2), k, &mut escapes);
+                }
             }
             progress.step(done.fetch_add(rows.len(), Ordering::Relaxed) + rows.len(), n).then_some(()).ok_or(Stopped)
         })?;
         self.join_parts(&block);
-        for (traced, starts) in self.traced.iter_mut().zip(block.starts.windows(2)) {
-            *traced += (starts[1] - starts[0]) as u32;
+        for (i, starts) in block.starts.windows(2).enumerate() {
+            let more = (starts[1] - starts[0]) as u32;
+            self.traced[i] += more;
+            let share = more as f32 / self.traced[i] as f32;
+            for (mean, new) in self.daylight[i].iter_mut().flatten().zip(daylight[i].as_flattened()) {
+                *mean += share * (new - *mean);
+            }
         }
         self.blocks.push(block);
         self.columns = columns;

@@ -1,0 +1,221 @@
+//! The sky through openings: rays are sent again to where rays got out.
+//!
+//! In a room with a window one cosine ray in a hundred gets out, and a hundred of them do not tell how much sky there is.
+//! But they tell where to look: the unit square that cosine rays are drawn from is cut into cells, and new rays are drawn
+//! by how much light the first ones, and those of receivers nearby, brought from each cell and the cells around it. Some go everywhere all the same, and each
+//! weighs the inverse of its density, so the mean is that of the sky whatever the first rays missed (importance sampling
+//! by a pilot; Kahn and Marshall 1953). Where much of the sky is seen, the first rays are good enough and count themselves.
+
+use crate::receivers::Site;
+use glam::DVec3;
+use radiosity_scene::{Bands, luminance};
+use radiosity_trace::sampling::Sequence;
+
+/// Most cells along each side of the square.
+const MOST_CELLS: usize = 32;
+
+/// Receivers on the same triangle up to so many numbers away look for each other. They are elements or texels side by
+/// side, most often, and see a window in the same cells or the next.
+const NEIGHBOURS: usize = 4;
+
+/// Share of the new rays that go everywhere alike.
+const EVEN: f64 = 0.25;
+
+/// Where this part of the hemisphere is sky, the first rays are good enough. The choice looks at these rays, which
+/// biases receivers right at the limit, by less than half of their own standard error.
+const OPEN: f64 = 0.5;
+
+/// Where no ray got out, this part of their number is sent again: a far slit may still be all the light there is.
+const CLOSED: u32 = 2;
+
+/// The stream of sample points that the new rays use.
+pub(crate) const DAYLIGHT: u32 = 0x0180;
+
+/// What rays of some receivers brought from the sky, by cells of the unit square that they were drawn from.
+#[derive(Default)]
+pub(crate) struct Escapes {
+    receivers: Vec<Receiver>,
+    side: usize,
+    /// Light by receiver and cell.
+    light: Vec<f32>,
+    /// Running sums of a density over cells: of rows, and of the cells in each row; each ends at 1.
+    rows: Vec<f64>,
+    cells: Vec<f64>,
+}
+
+/// What the rays of one receiver brought from the sky.
+#[derive(Clone, Copy, Default)]
+struct Receiver {
+    /// Its triangle and normal: receivers that share them draw the same directions from the same cells.
+    plane: Option<(u32, DVec3)>,
+    rays: u32,
+    halves: [[f64; 3]; 2],
+    sum: f64,
+    square: f64,
+}
+
+impl Escapes {
+    /// Makes ready for some receivers, of up to `most_rays` rays each, and forgets all others.
+    pub fn begin(&mut self, receivers: usize, most_rays: u32) {
+        self.side = 1;
+        // One ray to a cell.
+        while self.side < MOST_CELLS && 4 * self.side * self.side <= most_rays as usize {
+            self.side *= 2;
+        }
+        self.light.clear();
+        self.light.resize(receivers * self.side * self.side, 0.0);
+        self.receivers.clear();
+        self.receivers.resize(receivers, Receiver::default());
+    }
+
+    /// Where receiver k lies, and how many rays it sends.
+    pub fn place(&mut self, k: usize, site: &Site, rays: u32) {
+        self.receivers[k] = Receiver { plane: Some((site.triangle(), site.normal)), rays, ..Receiver::default() };
+    }
+
+    /// A ray of a half of receiver k, drawn from (u, v), got out and brought light.
+    pub fn add(&mut self, k: usize, half: usize, [u, v, ..]: [f32; 4], arriving: Bands) {
+        let own = &mut self.receivers[k];
+        (0..3).for_each(|band| own.halves[half][band] += f64::from(arriving[band]));
+        let light = luminance(arriving);
+        own.sum += f64::from(light);
+        own.square += f64::from(light).powi(2);
+        let cell = |x: f32| ((x * self.side as f32) as usize).min(self.side - 1);
+        let (i, j) = (cell(u), cell(v));
+        self.light[(k * self.side + j) * self.side + i] += light;
+    }
+
+    /// The mean light of the sky over the hemisphere of receiver k, by the two halves of its rays, or by those of new ones:
+    /// these take the points of a sequence from a given one on, no more than there were rays. `arriving` is asked for
+    /// the light of point (u, v, x, y), u and v drawn by the density.
+    pub fn mean(
+        &mut self,
+        k: usize,
+        (sequence, from): (&Sequence, u32),
+        mut arriving: impl FnMut(u32, [f32; 4]) -> Bands,
+    ) -> [Bands; 2] {
+        let own = self.receivers[k];
+        if own.plane.is_none() {
+            return Default::default();
+        }
+        if own.sum > 0.0 && own.sum * own.sum >= OPEN * f64::from(own.rays) * own.square {
+            return own.halves.map(|sum| sum.map(|s| (2.0 * s / f64::from(own.rays)) as f32));
+        }
+        let half_rays = if self.make_density(k) { own.rays / 2 } else { (own.rays / 2).div_ceil(CLOSED) };
+        [0, 1].map(|half| {
+            let mut sum = [0f64; 3];
+            for index in (0..half_rays).map(|i| from + half * half_rays + i) {
+                let [u, v, x, y] = sequence.point(index);
+                let (u, v, density) = self.draw(u, v);
+                let light = arriving(index, [u, v, x, y]);
+                (0..3).for_each(|band| sum[band] += f64::from(light[band]) / density);
+            }
+            sum.map(|s| (s / f64::from(half_rays)) as f32)
+        })
+    }
+
+    /// The density over cells for receiver k: by the light of each cell and the eight around it, as the receiver and its
+    /// neighbours found it, and a part that is even. Whether they found any.
+    fn make_density(&mut self, k: usize) -> bool {
+        let side = self.side;
+        let cells = side * side;
+        self.cells.clear();
+        self.cells.resize(cells, 0.0);
+        let plane = self.receivers[k].plane;
+        for other in k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(self.receivers.len()) {
+            if self.receivers[other].plane == plane && self.receivers[other].sum > 0.0 {
+                for (sum, light) in self.cells.iter_mut().zip(&self.light[other * cells..][..cells]) {
+                    *sum += f64::from(*light);
+                }
+            }
+        }
+        spread(&mut self.cells, side, 1);
+        spread(&mut self.cells, side, side);
+        let total: f64 = self.cells.iter().sum();
+        let even = 1.0 / cells as f64;
+        self.rows.clear();
+        let mut reached = 0.0;
+        for row in self.cells.chunks_exact_mut(side) {
+            let mut own = 0.0;
+            for cell in row.iter_mut() {
+                let share = if total > 0.0 { *cell / total } else { even };
+                own += EVEN * even + (1.0 - EVEN) * share;
+                *cell = own;
+            }
+            row.iter_mut().for_each(|cell| *cell /= own);
+            reached += own;
+            self.rows.push(reached);
+        }
+        self.rows.iter_mut().for_each(|row| *row /= reached);
+        total > 0.0
+    }
+
+    /// Maps a point of the unit square to one drawn by the density, which is answered with it.
+    fn draw(&self, u: f32, v: f32) -> (f32, f32, f64) {
+        let (j, v, of_rows) = invert(&self.rows, f64::from(v));
+        let (i, u, of_cells) = invert(&self.cells[j * self.side..][..self.side], f64::from(u));
+        let place = |k: usize, within: f64| (((k as f64 + within) / self.side as f64) as f32).min(1.0 - f32::EPSILON);
+        (place(i, u), place(j, v), of_rows * of_cells)
+    }
+}
+
+/// Adds to each cell the two beside it, along rows (`step` 1) or across them (`step` = `side`).
+fn spread(cells: &mut [f64], side: usize, step: usize) {
+    for line in 0..side {
+        let start = line * if step == 1 { side } else { 1 };
+        let mut before = 0.0;
+        for k in 0..side {
+            let at = start + k * step;
+            let (own, after) = (cells[at], if k + 1 < side { cells[at + step] } else { 0.0 });
+            cells[at] = before + own + after;
+            before = own;
+        }
+    }
+}
+
+/// The step of a running sum that x falls into, where within the step, and the step's density relative to an even one.
+fn invert(running: &[f64], x: f64) -> (usize, f64, f64) {
+    let k = running.partition_point(|end| *end <= x).min(running.len() - 1);
+    let start = if k == 0 { 0.0 } else { running[k - 1] };
+    let share = running[k] - start;
+    (k, ((x - start) / share).clamp(0.0, 1.0), share * running.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bright spot of the square: its mean comes out whether the first rays met it or not, and with far less noise.
+    #[test]
+    fn what_was_missed_is_not_lost() {
+        let inside = |u: f32, v: f32| (0.3..0.4).contains(&u) && (0.6..0.76).contains(&v);
+        let light = |u, v| if inside(u, v) { [100.0; 3] } else { [0.0; 3] };
+        let exact = 100.0 * 0.1 * 0.16;
+        for rays in [16, 64, 256, 1024] {
+            let (mut plain, mut guided) = ([0.0; 2], [0.0; 2]);
+            let count = 4000;
+            let mut escapes = Escapes::default();
+            for seed in 0..count {
+                let sequence = Sequence::new(seed, 1);
+                escapes.begin(1, rays);
+                escapes.receivers[0] = Receiver { plane: Some((0, DVec3::Z)), rays, ..Receiver::default() };
+                let mut sum = 0.0;
+                for point in (0..rays).map(|index| sequence.point(index)).filter(|p| inside(p[0], p[1])) {
+                    escapes.add(0, 0, point, light(point[0], point[1]));
+                    sum += 100.0;
+                }
+                let [a, b] = escapes.mean(0, (&Sequence::new(seed, 2), 0), |_, [u, v, ..]| light(u, v));
+                for (sums, found) in [(&mut plain, sum / f64::from(rays)), (&mut guided, 0.5 * f64::from(a[1] + b[1]))]
+                {
+                    sums[0] += found / f64::from(count);
+                    sums[1] += (found - exact).powi(2) / f64::from(count);
+                }
+            }
+            let error = (guided[1] / f64::from(count)).sqrt();
+            assert!((guided[0] - exact).abs() < 4.0 * error, "{rays}: {} for {exact} ± {error}", guided[0]);
+            if rays > 64 {
+                assert!(guided[1] < 0.1 * plain[1], "{rays}: {guided:?} {plain:?}");
+            }
+        }
+    }
+}
