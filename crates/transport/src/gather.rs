@@ -5,7 +5,7 @@
 //! seen: there the ray goes on as a path — one light sample, one more ray — and so contacts, shelves and corners are
 //! resolved below the size of the elements.
 
-use crate::daylight::{DAYLIGHT, Escapes};
+use crate::pilot::{AGAIN, Pilot};
 use crate::receivers::Site;
 use crate::rows::IdSpace;
 use crate::{Columns, Luminaires, Progress, Receivers, Stopped};
@@ -50,14 +50,6 @@ pub struct Gather<'a> {
     pub area: &'a [f64],
 }
 
-/// What a ray brings.
-enum Arriving {
-    /// Radiosity of surfaces, and of the sky by way of them.
-    Reflected([f64; 3]),
-    /// Radiosity of the sky, seen directly.
-    Sky(Bands),
-}
-
 impl Gather<'_> {
     /// Mean incoming radiosity at each receiver over `rays` rays, as two halves: its indirect irradiance.
     ///
@@ -75,46 +67,30 @@ impl Gather<'_> {
         let done = AtomicUsize::new(0);
         let mut means = vec![[[0f32; 3]; 2]; n];
         means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
-            let mut escapes = Escapes::default();
-            let black = self.tracer.scene.sky.is_black();
-            escapes.begin(means.len(), if black { 0 } else { 2 * half_rays });
-            let ray = |site: &Site, frame: &[DVec3; 3], [u, v, x, y]: [f32; 4]| {
-                (site.place(x, y), cosine_direction(frame, f64::from(u), f64::from(v)))
-            };
+            let mut pilot = Pilot::default();
+            pilot.begin(means.len(), 2 * half_rays);
             let own = |k: usize| {
                 let i = chunk * CHUNK + k;
                 receivers.site(i).map(|site| (receivers.seed(i), frame(site.normal), site))
             };
-            for (k, mean) in means.iter_mut().enumerate() {
+            let cast = |site: &Site, frame: &[DVec3; 3], [u, v, x, y]: [f32; 4], salt: u32| {
+                self.arriving(&site.place(x, y), cosine_direction(frame, f64::from(u), f64::from(v)), salt)
+            };
+            for k in 0..means.len() {
                 let Some((seed, frame, site)) = own(k) else { continue };
                 let sequence = Sequence::new(seed, GATHER);
-                escapes.place(k, &site, 2 * half_rays);
-                for half in 0..2 {
-                    let mut sum = [0f64; 3];
-                    for index in half * half_rays..(half + 1) * half_rays {
-                        let point = sequence.point(index);
-                        let (place, direction) = ray(&site, &frame, point);
-                        match self.arriving(&place, direction, hash(hash(seed) ^ index)) {
-                            Arriving::Reflected(light) => (0..3).for_each(|band| sum[band] += light[band]),
-                            Arriving::Sky(light) => escapes.add(k, half as usize, point, light),
-                        }
-                    }
-                    mean[half as usize] = sum.map(|s| (s / f64::from(half_rays)) as f32);
+                pilot.place(k, &site, 2 * half_rays);
+                for index in 0..2 * half_rays {
+                    let point = sequence.point(index);
+                    let half = usize::from(index >= half_rays);
+                    pilot.add(k, half, point, cast(&site, &frame, point, hash(hash(seed) ^ index)));
                 }
             }
-            for (k, mean) in means.iter_mut().enumerate().filter(|_| !black) {
+            for (k, mean) in means.iter_mut().enumerate() {
                 let Some((seed, frame, site)) = own(k) else { continue };
-                let daylight = escapes.mean(k, (&Sequence::new(seed, DAYLIGHT), 0), |index, point| {
-                    let (place, direction) = ray(&site, &frame, point);
-                    let salt = hash(hash(seed ^ DAYLIGHT) ^ index);
-                    match self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), salt) {
-                        Found::Escaped => self.sky(self.ids.id(Found::Escaped, direction)),
-                        _ => Default::default(),
-                    }
+                *mean = pilot.mean(k, (&Sequence::new(seed, AGAIN), 0), |index, point| {
+                    cast(&site, &frame, point, hash(hash(seed ^ AGAIN) ^ index))
                 });
-                for (mean, sky) in mean.iter_mut().flatten().zip(daylight.as_flattened()) {
-                    *mean += sky;
-                }
             }
             let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
             progress.step(so_far, n).then_some(()).ok_or(Stopped)
@@ -122,22 +98,13 @@ impl Gather<'_> {
         Ok(means)
     }
 
-    /// Radiosity π L of the sky patch with an id, lm/m² per band.
-    fn sky(&self, id: u32) -> Bands {
-        let [r, g, b, _] = self.values[id as usize];
-        [r, g, b]
-    }
-
     /// Radiosity that arrives at a place from a direction, without that of the luminaires.
-    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32) -> Arriving {
+    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32) -> [f64; 3] {
         let (mut place, mut direction) = (*from, direction);
         let (mut sum, mut throughput) = ([0f64; 3], [1f64; 3]);
         for bounce in 0.. {
             let found = self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), seed);
             let id = self.ids.id(found, direction);
-            if bounce == 0 && found == Found::Escaped {
-                return Arriving::Sky(self.sky(id));
-            }
             let near = match found {
                 Found::Surface { triangle, uv, side, distance } if bounce < DEEPEST && id != self.ids.nothing() => {
                     let near = f64::from(distance) < near(self.area[id as usize]);
@@ -148,7 +115,7 @@ impl Gather<'_> {
             let Some((triangle, uv, side)) = near else {
                 let value = self.values[id as usize];
                 (0..3).for_each(|band| sum[band] += throughput[band] * f64::from(value[band]));
-                return Arriving::Reflected(sum);
+                return sum;
             };
 
             // Go on as a path from the very spot.
@@ -170,7 +137,7 @@ impl Gather<'_> {
             let reflectance = scene.reflectance(at);
             (0..3).for_each(|band| throughput[band] *= f64::from(reflectance[band]));
             if throughput.iter().all(|t| *t <= 0.0) {
-                return Arriving::Reflected(sum);
+                return sum;
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
             let direct = self.one_light(&spot, id as usize, seed);
@@ -179,7 +146,7 @@ impl Gather<'_> {
             direction = cosine_direction(&frame(spot.normal), u, v);
             place = spot;
         }
-        Arriving::Reflected(sum)
+        sum
     }
 
     /// Direct irradiance at a spot of an element, by one light picked after what the element received.

@@ -5,12 +5,12 @@
 //! through rows: [`Luminaires`] gives their light as a direct column each. Receivers are elements while the equation
 //! is solved and points when an answer is read; both go through the same code ([`Receivers`]).
 
-mod daylight;
 pub mod direct;
 pub mod exposure;
 pub mod gather;
 pub mod luminaires;
 mod one_light;
+mod pilot;
 pub mod polygon;
 pub mod receivers;
 pub mod rows;

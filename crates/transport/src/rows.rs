@@ -9,7 +9,7 @@
 //! of them and averages their noise out.
 //! It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
 
-use crate::daylight::{DAYLIGHT, Escapes};
+use crate::pilot::{AGAIN, Pilot};
 use crate::receivers::Site;
 use crate::{Progress, Receivers, Stopped};
 use glam::DVec3;
@@ -92,33 +92,33 @@ impl<R: Receivers> Caster<'_, R> {
     }
 
     /// Radiosity of the sky patch with an id; `None` for what is not sky.
-    fn light(&self, id: u32) -> Option<Bands> {
-        self.sky.get((id as usize).checked_sub(self.ids.elements.len())?).copied()
+    fn light(&self, id: u32) -> Option<[f64; 3]> {
+        Some(self.sky.get((id as usize).checked_sub(self.ids.elements.len())?)?.map(f64::from))
     }
 
-    /// Rays `2 from..2 to` of receiver i, in two halves, which are those of `row`; what escapes goes to receiver k there.
-    fn trace(&self, (i, from): (usize, u32), row: &mut [u32], k: usize, escapes: &mut Escapes) {
+    /// Rays `2 from..2 to` of receiver i, in two halves, which are those of `row`; what pilot goes to receiver k there.
+    fn trace(&self, (i, from): (usize, u32), row: &mut [u32], k: usize, pilot: &mut Pilot) {
         let Some(site) = self.receivers.site(i) else { return row.fill(self.ids.nothing()) };
         let (seed, frame) = (self.receivers.seed(i), frame(site.normal));
         let sequence = Sequence::new(seed, ROWS);
-        escapes.place(k, &site, row.len() as u32);
+        pilot.place(k, &site, row.len() as u32);
         let half = row.len() / 2;
         for (m, id) in row.iter_mut().enumerate() {
             let index = 2 * from + m as u32;
             let point = sequence.point(index);
             *id = self.cast(&site, &frame, point, hash(hash(seed) ^ index));
             if let Some(light) = self.light(*id) {
-                escapes.add(k, m / half, point, light);
+                pilot.add(k, m / half, point, light);
             }
         }
     }
 
     /// Mean radiosity of the sky over the hemisphere of receiver i, k there, as two halves.
-    fn daylight(&self, (i, from): (usize, u32), k: usize, escapes: &mut Escapes) -> [Bands; 2] {
+    fn daylight(&self, (i, from): (usize, u32), k: usize, pilot: &mut Pilot) -> [Bands; 2] {
         let Some(site) = self.receivers.site(i) else { return Default::default() };
         let (seed, frame) = (self.receivers.seed(i), frame(site.normal));
-        escapes.mean(k, (&Sequence::new(seed, DAYLIGHT), 2 * from), |index, point| {
-            let id = self.cast(&site, &frame, point, hash(hash(seed ^ DAYLIGHT) ^ index));
+        pilot.mean(k, (&Sequence::new(seed, AGAIN), 2 * from), |index, point| {
+            let id = self.cast(&site, &frame, point, hash(hash(seed ^ AGAIN) ^ index));
             self.light(id).unwrap_or_default()
         })
     }
@@ -225,12 +225,12 @@ impl HitTable {
         let caster = Caster { tracer, ids, sky, receivers };
         let chunks = split_rows(&mut block.ids, &block.starts, CHUNK).into_par_iter();
         chunks.zip(daylight.par_chunks_mut(CHUNK)).try_for_each(|((rows, mut ids_left), daylight)| {
-            let mut escapes = Escapes::default();
-            escapes.begin(rows.len(), if sky.is_empty() { 0 } else { more as u32 });
+            let mut pilot = Pilot::default();
+            pilot.begin(rows.len(), if sky.is_empty() { 0 } else { more as u32 });
             for (k, i) in rows.clone().enumerate() {
                 let row;
                 (row, ids_left) = ids_left.split_at_mut(block.starts[i + 1] - block.starts[i]);
-                caster.trace((i, self.traced[i] / 2), row, k, &mut escapes);
+                caster.trace((i, self.traced[i] / 2), row, k, &mut pilot);
                 // Neighbouring ids lie in the same cache lines when the row is read back in order.
                 let half = row.len() / 2;
                 row[..half].sort_unstable();
@@ -238,7 +238,7 @@ impl HitTable {
             }
             if !sky.is_empty() {
                 for (k, (i, daylight)) in rows.clone().zip(daylight).enumerate() {
-                    *daylight = caster.daylight((i, self.traced[i] / 2), k, &mut escapes);
+                    *daylight = caster.daylight((i, self.traced[i] / 2), k, &mut pilot);
                 }
             }
             progress.step(done.fetch_add(rows.len(), Ordering::Relaxed) + rows.len(), n).then_some(()).ok_or(Stopped)

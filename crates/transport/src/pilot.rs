@@ -1,14 +1,16 @@
-//! The sky through openings: rays are sent again to where rays got out.
+//! Light that comes from few directions, through a window or from a patch of sun: rays are sent again to where it was found.
 //!
 //! In a room with a window one cosine ray in a hundred gets out, and a hundred of them do not tell how much sky there is.
 //! But they tell where to look: the unit square that cosine rays are drawn from is cut into cells, and new rays are drawn
-//! by how much light the first ones, and those of receivers nearby, brought from each cell and the cells around it. Some go everywhere all the same, and each
-//! weighs the inverse of its density, so the mean is that of the sky whatever the first rays missed (importance sampling
-//! by a pilot; Kahn and Marshall 1953). Where much of the sky is seen, the first rays are good enough and count themselves.
+//! by how much light the first ones, and those of receivers nearby, brought from each cell and the cells around it. Some
+//! go everywhere all the same, and each weighs the inverse of its density, so the mean is right whatever the first rays
+//! missed (importance sampling by a pilot; Kahn and Marshall 1953). Where light comes from all around, the first rays
+//! are good enough and count themselves.
 
+use crate::one_light::luminance_of;
 use crate::receivers::Site;
 use glam::DVec3;
-use radiosity_scene::{Bands, luminance};
+use radiosity_scene::Bands;
 use radiosity_trace::sampling::Sequence;
 
 /// Most cells along each side of the square.
@@ -21,19 +23,21 @@ const NEIGHBOURS: usize = 4;
 /// Share of the new rays that go everywhere alike.
 const EVEN: f64 = 0.25;
 
-/// Where this part of the hemisphere is sky, the first rays are good enough. The choice looks at these rays, which
-/// biases receivers right at the limit, by less than half of their own standard error.
-const OPEN: f64 = 0.5;
+/// Where (Σ light)² is this part of rays · Σ light², as if an even light came from that part of the hemisphere, the first
+/// rays are good enough. The choice looks at these rays, which biases receivers right at the limit, by less than half of
+/// their own standard error.
+const OPEN: f64 = 0.1;
 
-/// Where no ray got out, this part of their number is sent again: a far slit may still be all the light there is.
-const CLOSED: u32 = 2;
+/// So many rays, those of neighbours included, are trusted to have missed nothing that matters: a window that sends less
+/// than one of them is a speck.
+const TRUSTED: u32 = 512;
 
 /// The stream of sample points that the new rays use.
-pub(crate) const DAYLIGHT: u32 = 0x0180;
+pub(crate) const AGAIN: u32 = 0x0180;
 
-/// What rays of some receivers brought from the sky, by cells of the unit square that they were drawn from.
+/// What the first rays of some receivers brought, by cells of the unit square that they were drawn from.
 #[derive(Default)]
-pub(crate) struct Escapes {
+pub(crate) struct Pilot {
     receivers: Vec<Receiver>,
     side: usize,
     /// Light by receiver and cell.
@@ -43,7 +47,7 @@ pub(crate) struct Escapes {
     cells: Vec<f64>,
 }
 
-/// What the rays of one receiver brought from the sky.
+/// What the first rays of one receiver brought.
 #[derive(Clone, Copy, Default)]
 struct Receiver {
     /// Its triangle and normal: receivers that share them draw the same directions from the same cells.
@@ -54,7 +58,7 @@ struct Receiver {
     square: f64,
 }
 
-impl Escapes {
+impl Pilot {
     /// Makes ready for some receivers, of up to `most_rays` rays each, and forgets all others.
     pub fn begin(&mut self, receivers: usize, most_rays: u32) {
         self.side = 1;
@@ -73,57 +77,60 @@ impl Escapes {
         self.receivers[k] = Receiver { plane: Some((site.triangle(), site.normal)), rays, ..Receiver::default() };
     }
 
-    /// A ray of a half of receiver k, drawn from (u, v), got out and brought light.
-    pub fn add(&mut self, k: usize, half: usize, [u, v, ..]: [f32; 4], arriving: Bands) {
+    /// A ray of a half of receiver k, drawn from (u, v), brought light. What brings none need not be told.
+    pub fn add(&mut self, k: usize, half: usize, [u, v, ..]: [f32; 4], arriving: [f64; 3]) {
         let own = &mut self.receivers[k];
-        (0..3).for_each(|band| own.halves[half][band] += f64::from(arriving[band]));
-        let light = luminance(arriving);
-        own.sum += f64::from(light);
-        own.square += f64::from(light).powi(2);
+        (0..3).for_each(|band| own.halves[half][band] += arriving[band]);
+        let light = luminance_of(arriving);
+        own.sum += light;
+        own.square += light * light;
         let cell = |x: f32| ((x * self.side as f32) as usize).min(self.side - 1);
         let (i, j) = (cell(u), cell(v));
-        self.light[(k * self.side + j) * self.side + i] += light;
+        self.light[(k * self.side + j) * self.side + i] += light as f32;
     }
 
-    /// The mean light of the sky over the hemisphere of receiver k, by the two halves of its rays, or by those of new ones:
-    /// these take the points of a sequence from a given one on, no more than there were rays. `arriving` is asked for
+    /// The mean light over the hemisphere of receiver k, by the two halves of its rays, or by those of new ones: these take the points of a sequence from a given one on, no more than there were rays. `arriving` is asked for
     /// the light of point (u, v, x, y), u and v drawn by the density.
     pub fn mean(
         &mut self,
         k: usize,
         (sequence, from): (&Sequence, u32),
-        mut arriving: impl FnMut(u32, [f32; 4]) -> Bands,
+        mut arriving: impl FnMut(u32, [f32; 4]) -> [f64; 3],
     ) -> [Bands; 2] {
         let own = self.receivers[k];
         if own.plane.is_none() {
             return Default::default();
         }
-        if own.sum > 0.0 && own.sum * own.sum >= OPEN * f64::from(own.rays) * own.square {
+        let (mut rays, mut sum, mut square) = (0, 0.0, 0.0);
+        for other in self.neighbours(k).map(|other| self.receivers[other]) {
+            (rays, sum, square) = (rays + other.rays, sum + other.sum, square + other.square);
+        }
+        if rays >= TRUSTED && sum * sum >= OPEN * f64::from(rays) * square {
             return own.halves.map(|sum| sum.map(|s| (2.0 * s / f64::from(own.rays)) as f32));
         }
-        let half_rays = if self.make_density(k) { own.rays / 2 } else { (own.rays / 2).div_ceil(CLOSED) };
+        let half_rays = own.rays / 2;
+        self.make_density(k);
         [0, 1].map(|half| {
             let mut sum = [0f64; 3];
             for index in (0..half_rays).map(|i| from + half * half_rays + i) {
                 let [u, v, x, y] = sequence.point(index);
                 let (u, v, density) = self.draw(u, v);
                 let light = arriving(index, [u, v, x, y]);
-                (0..3).for_each(|band| sum[band] += f64::from(light[band]) / density);
+                (0..3).for_each(|band| sum[band] += light[band] / density);
             }
             sum.map(|s| (s / f64::from(half_rays)) as f32)
         })
     }
 
     /// The density over cells for receiver k: by the light of each cell and the eight around it, as the receiver and its
-    /// neighbours found it, and a part that is even. Whether they found any.
-    fn make_density(&mut self, k: usize) -> bool {
+    /// neighbours found it, and a part that is even.
+    fn make_density(&mut self, k: usize) {
         let side = self.side;
         let cells = side * side;
         self.cells.clear();
         self.cells.resize(cells, 0.0);
-        let plane = self.receivers[k].plane;
-        for other in k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(self.receivers.len()) {
-            if self.receivers[other].plane == plane && self.receivers[other].sum > 0.0 {
+        for other in self.neighbours(k) {
+            if self.receivers[other].sum > 0.0 {
                 for (sum, light) in self.cells.iter_mut().zip(&self.light[other * cells..][..cells]) {
                     *sum += f64::from(*light);
                 }
@@ -147,7 +154,15 @@ impl Escapes {
             self.rows.push(reached);
         }
         self.rows.iter_mut().for_each(|row| *row /= reached);
-        total > 0.0
+    }
+
+    /// Receivers near number k on its plane, itself among them.
+    fn neighbours(&self, k: usize) -> impl Iterator<Item = usize> + use<> {
+        let plane = self.receivers[k].plane;
+        let near = k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(self.receivers.len());
+        let on_plane: [bool; 2 * NEIGHBOURS + 1] =
+            std::array::from_fn(|i| near.start + i < near.end && self.receivers[near.start + i].plane == plane);
+        near.clone().filter(move |other| on_plane[other - near.start])
     }
 
     /// Maps a point of the unit square to one drawn by the density, which is answered with it.
@@ -194,17 +209,17 @@ mod tests {
         for rays in [16, 64, 256, 1024] {
             let (mut plain, mut guided) = ([0.0; 2], [0.0; 2]);
             let count = 4000;
-            let mut escapes = Escapes::default();
+            let mut pilot = Pilot::default();
             for seed in 0..count {
                 let sequence = Sequence::new(seed, 1);
-                escapes.begin(1, rays);
-                escapes.receivers[0] = Receiver { plane: Some((0, DVec3::Z)), rays, ..Receiver::default() };
+                pilot.begin(1, rays);
+                pilot.receivers[0] = Receiver { plane: Some((0, DVec3::Z)), rays, ..Receiver::default() };
                 let mut sum = 0.0;
                 for point in (0..rays).map(|index| sequence.point(index)).filter(|p| inside(p[0], p[1])) {
-                    escapes.add(0, 0, point, light(point[0], point[1]));
+                    pilot.add(0, 0, point, light(point[0], point[1]));
                     sum += 100.0;
                 }
-                let [a, b] = escapes.mean(0, (&Sequence::new(seed, 2), 0), |_, [u, v, ..]| light(u, v));
+                let [a, b] = pilot.mean(0, (&Sequence::new(seed, 2), 0), |_, [u, v, ..]| light(u, v));
                 for (sums, found) in [(&mut plain, sum / f64::from(rays)), (&mut guided, 0.5 * f64::from(a[1] + b[1]))]
                 {
                     sums[0] += found / f64::from(count);
