@@ -3,9 +3,16 @@
 //! Objects, instances and separate primitives that touch are sewn together by position, so that neither rays nor
 //! interpolated light find a crack between them. A vertex that lies on a neighbour's edge (a T-vertex; Baum, Mann,
 //! Smith and Winget 1991, "Making radiosity usable", §4) splits that neighbour. Only edges without a partner are
-//! examined: the closed box that stands on a floor does not cut the floor.
+//! examined: the closed box that stands on a floor does not cut the floor. A wall without thickness does ([`feet`]).
+
+mod boxes;
+mod cut;
+mod edges;
+mod feet;
 
 use crate::{Scene, Surface};
+use edges::{is_balanced, ordered, sides_of_edges};
+use feet::Feet;
 use glam::{DVec2, DVec3};
 use rustc_hash::FxHashMap;
 
@@ -65,10 +72,9 @@ const WHOLE: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::Y];
 impl Mesh {
     /// Welds a scene.
     pub fn new(scene: &Scene) -> Mesh {
-        let tolerance = weld_distance(scene);
-        let (vertices, welded) = weld(&scene.positions, tolerance);
-
-        let mut mesh = Mesh { vertices, tolerance, ..Mesh::default() };
+        let mut weld = Weld::new(weld_distance(scene));
+        let mut mesh = Mesh { tolerance: weld.tolerance, ..Mesh::default() };
+        let welded: Vec<u32> = scene.positions.iter().map(|&p| weld.vertex(&mut mesh.vertices, p)).collect();
         for (index, corners) in scene.triangles.iter().enumerate() {
             let corners = corners.map(|v| welded[v as usize]);
             if corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0] {
@@ -78,7 +84,8 @@ impl Mesh {
                 mesh.dropped.push(index as u32);
             }
         }
-        mesh.conform();
+        let feet = mesh.cut_along_feet(scene, &mut weld);
+        mesh.conform(&feet);
         mesh.smoothen(scene);
         mesh
     }
@@ -97,7 +104,8 @@ impl Mesh {
         if suspects.is_empty() {
             return (Vec::new(), tolerance);
         }
-        let (_, welded) = weld(&scene.positions, tolerance);
+        let (mut weld, mut vertices) = (Weld::new(tolerance), Vec::new());
+        let welded: Vec<u32> = scene.positions.iter().map(|&p| weld.vertex(&mut vertices, p)).collect();
         let vanishes = |&t: &usize| {
             let [a, b, c] = scene.triangles[t].map(|v| welded[v as usize]);
             a == b || b == c || c == a
@@ -148,13 +156,14 @@ impl Mesh {
     }
 
     /// Splits every triangle at the T-vertices on its edges.
-    fn conform(&mut self) {
-        let hanging = self.hanging_vertices();
+    fn conform(&mut self, feet: &Feet) {
+        let hanging = self.hanging_vertices(feet);
         if hanging.is_empty() {
             return;
         }
         let (triangles, source) = (std::mem::take(&mut self.triangles), std::mem::take(&mut self.source));
-        for (corners, source) in triangles.into_iter().zip(source) {
+        let split = std::mem::take(&mut self.split);
+        for (t, (corners, source)) in triangles.into_iter().zip(source).enumerate() {
             let edges = std::array::from_fn(|i| {
                 let (a, b) = (corners[i], corners[(i + 1) % 3]);
                 let mut list = hanging.get(&ordered(a, b)).cloned().unwrap_or_default();
@@ -166,12 +175,12 @@ impl Mesh {
                 });
                 list
             });
-            self.cut(source, corners, WHOLE, edges);
+            self.bisect(source, corners, *split.get(t).unwrap_or(&WHOLE), edges);
         }
     }
 
     /// Adds a triangle, bisected at the vertices on its edges until none is left.
-    fn cut(&mut self, source: u32, corners: [u32; 3], bary: [DVec2; 3], edges: [Vec<u32>; 3]) {
+    fn bisect(&mut self, source: u32, corners: [u32; 3], bary: [DVec2; 3], edges: [Vec<u32>; 3]) {
         let Some(longest) = (0..3).max_by_key(|&i| edges[i].len()).filter(|&i| !edges[i].is_empty()) else {
             self.triangles.push(corners);
             self.source.push(source);
@@ -188,23 +197,20 @@ impl Mesh {
         let (start, along) = (self.vertices[a as usize], self.vertices[b as usize] - self.vertices[a as usize]);
         let share = (self.vertices[p as usize] - start).dot(along) / along.length_squared();
         let bary_p = bary_a + share * (bary_b - bary_a);
-        self.cut(source, [a, p, c], [bary_a, bary_p, bary_c], [ab[..middle].to_vec(), Vec::new(), ca]);
-        self.cut(source, [p, b, c], [bary_p, bary_b, bary_c], [ab[middle + 1..].to_vec(), bc, Vec::new()]);
+        self.bisect(source, [a, p, c], [bary_a, bary_p, bary_c], [ab[..middle].to_vec(), Vec::new(), ca]);
+        self.bisect(source, [p, b, c], [bary_p, bary_b, bary_c], [ab[middle + 1..].to_vec(), bc, Vec::new()]);
     }
 
-    /// For every edge without a partner, the vertices of other such edges that lie on it.
-    fn hanging_vertices(&self) -> FxHashMap<(u32, u32), Vec<u32>> {
-        // Count how often each edge is walked in either direction; a surface's inner edges are walked once each way.
-        let mut walked: FxHashMap<(u32, u32), [u32; 2]> = FxHashMap::default();
-        for corners in &self.triangles {
-            for i in 0..3 {
-                let (a, b) = (corners[i], corners[(i + 1) % 3]);
-                walked.entry(ordered(a, b)).or_default()[usize::from(a > b)] += 1;
-            }
-        }
-        let mut loose: Vec<(u32, u32)> =
-            walked.into_iter().filter(|(_, count)| count[0] != count[1]).map(|(edge, _)| edge).collect();
+    /// For every edge without a partner, the vertices of other such edges that lie on it; where surfaces stand on
+    /// others, for the edges there and the vertices there too.
+    fn hanging_vertices(&self, feet: &Feet) -> FxHashMap<(u32, u32), Vec<u32>> {
+        // A surface's inner edges are walked once each way.
+        let sides = sides_of_edges(&self.triangles, self.vertices.len());
+        let unbalanced = sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| !is_balanced(faces));
+        let mut loose: Vec<(u32, u32)> = unbalanced.map(|faces| faces[0].edge).collect();
+        loose.extend(feet.edges.iter().filter(|edge| sides.binary_search_by_key(edge, |side| &side.edge).is_ok()));
         loose.sort_unstable();
+        loose.dedup();
         if loose.is_empty() {
             return FxHashMap::default();
         }
@@ -214,7 +220,7 @@ impl Mesh {
         let mean = loose.iter().map(length).sum::<f64>() / loose.len() as f64;
         let cell = mean.max(8.0 * self.tolerance);
         let key = |p: DVec3| (p / cell).floor().as_i64vec3().to_array();
-        let mut ends: Vec<u32> = loose.iter().flat_map(|&(a, b)| [a, b]).collect();
+        let mut ends: Vec<u32> = loose.iter().flat_map(|&(a, b)| [a, b]).chain(feet.vertices.iter().copied()).collect();
         ends.sort_unstable();
         ends.dedup();
         let mut grid: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
@@ -262,30 +268,20 @@ impl Mesh {
     /// Joins the corners around each vertex across the edges at which the surface is smooth.
     fn smoothen(&mut self, scene: &Scene) {
         let normals: Vec<DVec3> = (0..self.triangles.len()).map(|t| self.normal(t)).collect();
-        let mut edges: FxHashMap<(u32, u32), Vec<(u32, u8)>> = FxHashMap::default();
-        for (t, corners) in self.triangles.iter().enumerate() {
-            for i in 0..3 {
-                let key = ordered(corners[i], corners[(i + 1) % 3]);
-                edges.entry(key).or_default().push((t as u32, i as u8));
-            }
-        }
         let mut joined = Union::new(3 * self.triangles.len());
-        let mut keys: Vec<_> = edges.keys().copied().collect();
-        keys.sort_unstable();
-        for key in keys {
-            let sides = &edges[&key];
+        let all = sides_of_edges(&self.triangles, self.vertices.len());
+        for sides in all.chunk_by(|a, b| a.edge == b.edge) {
             if sides.len() > MAX_FACES_ON_EDGE {
                 continue;
             }
-            for (n, &(t, i)) in sides.iter().enumerate() {
-                for &(s, j) in &sides[n + 1..] {
-                    let (t, i, s, j) = (t as usize, usize::from(i), s as usize, usize::from(j));
+            for (n, (t, i)) in sides.iter().map(|side| side.place()).enumerate() {
+                for (s, j) in sides[n + 1..].iter().map(|side| side.place()) {
                     // Two faces continue each other when they walk their common edge in opposite directions.
                     let opposite = self.triangles[t][i] == self.triangles[s][(j + 1) % 3];
                     if !opposite {
                         continue;
                     }
-                    let around = sides.iter().map(|&(r, k)| (r as usize, usize::from(k)));
+                    let around = sides.iter().map(|side| side.place());
                     let separated = sides.len() > 2 && self.is_separated(scene, &normals, (t, i), s, around);
                     for (tc, sc) in [(i, (j + 1) % 3), ((i + 1) % 3, j)] {
                         if !separated && self.is_smooth(scene, &normals, (t, tc), (s, sc)) {
@@ -355,44 +351,44 @@ impl Mesh {
     }
 }
 
-fn ordered(a: u32, b: u32) -> (u32, u32) {
-    (a.min(b), a.max(b))
-}
-
 fn weld_distance(scene: &Scene) -> f64 {
     let extent = scene.bounding_box().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
     (extent * WELD).max(f64::MIN_POSITIVE)
 }
 
-/// Representative positions, and the representative of each input position. The first of a cluster represents it.
-fn weld(positions: &[DVec3], tolerance: f64) -> (Vec<DVec3>, Vec<u32>) {
-    let cell = 2.0 * tolerance;
-    let mut grid: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
-    let mut vertices: Vec<DVec3> = Vec::new();
-    let welded = positions
-        .iter()
-        .map(|&p| {
-            // The cells within the tolerance of p: two at most along each axis.
-            let low = ((p - DVec3::splat(tolerance)) / cell).floor().as_i64vec3();
-            let high = ((p + DVec3::splat(tolerance)) / cell).floor().as_i64vec3();
-            for x in low.x..=high.x {
-                for y in low.y..=high.y {
-                    for z in low.z..=high.z {
-                        for &v in grid.get(&[x, y, z]).into_iter().flatten() {
-                            if vertices[v as usize].distance_squared(p) <= tolerance * tolerance {
-                                return v;
-                            }
+/// Finds vertices by their place. The first of a cluster represents it.
+struct Weld {
+    tolerance: f64,
+    grid: FxHashMap<[i64; 3], Vec<u32>>,
+}
+
+impl Weld {
+    fn new(tolerance: f64) -> Weld {
+        Weld { tolerance, grid: FxHashMap::default() }
+    }
+
+    /// The vertex at a place, added where there is none.
+    fn vertex(&mut self, vertices: &mut Vec<DVec3>, p: DVec3) -> u32 {
+        let (tolerance, cell) = (self.tolerance, 2.0 * self.tolerance);
+        // The cells within the tolerance of p: two at most along each axis.
+        let low = ((p - DVec3::splat(tolerance)) / cell).floor().as_i64vec3();
+        let high = ((p + DVec3::splat(tolerance)) / cell).floor().as_i64vec3();
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                for z in low.z..=high.z {
+                    for &v in self.grid.get(&[x, y, z]).into_iter().flatten() {
+                        if vertices[v as usize].distance_squared(p) <= tolerance * tolerance {
+                            return v;
                         }
                     }
                 }
             }
-            let v = vertices.len() as u32;
-            vertices.push(p);
-            grid.entry((p / cell).floor().as_i64vec3().to_array()).or_default().push(v);
-            v
-        })
-        .collect();
-    (vertices, welded)
+        }
+        let v = vertices.len() as u32;
+        vertices.push(p);
+        self.grid.entry((p / cell).floor().as_i64vec3().to_array()).or_default().push(v);
+        v
+    }
 }
 
 /// Disjoint sets with path halving.
@@ -511,7 +507,7 @@ mod tests {
         assert_eq!(mesh.triangles.len(), 10 + 3);
         let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
         assert!((area - 4.0).abs() < 1e-12, "{area}");
-        assert!(mesh.hanging_vertices().is_empty());
+        assert!(mesh.hanging_vertices(&Feet::default()).is_empty());
         // Points keep their place on the source triangle.
         for t in 0..mesh.triangles.len() {
             let uv = DVec2::new(0.3, 0.2);
