@@ -93,7 +93,8 @@ pub fn lightmap(
     let triangles: Vec<[u32; 3]> =
         faces.iter().map(|f| f.order().map(|corner| mesh.triangles[f.triangle][corner])).collect();
     let group: Vec<u32> = faces.iter().map(|f| 2 * f.object as u32 + f.side as u32).collect();
-    let input = UnwrapInput { positions: &mesh.vertices, triangles: &triangles, group: &group };
+    let smooth: Vec<[u32; 3]> = faces.iter().map(|f| f.order().map(|corner| mesh.smooth[f.triangle][corner])).collect();
+    let input = UnwrapInput { positions: &mesh.vertices, triangles: &triangles, group: &group, smooth: &smooth };
     let mut params = UnwrapParams { max_page, ..UnwrapParams::default() };
     monitor.stage("unwrap");
     let charts = Charts::new(&input, &params)?;
@@ -143,7 +144,6 @@ pub fn lightmap(
     }
 
     // Light is continuous across an edge where the two faces share both its smooth vertices.
-    let smooth: Vec<[u32; 3]> = faces.iter().map(|f| f.order().map(|corner| mesh.smooth[f.triangle][corner])).collect();
     let side: Vec<u32> = faces.iter().map(|f| f.side as u32).collect();
     let seams = shared_edges(&smooth, Some(&side));
     monitor.stage("seams");

@@ -15,7 +15,7 @@ pub(super) struct Region {
 
 /// Cosine of the largest angle (0.25°) between a triangle and the plane of its region. A length in the region is then
 /// wrong by at most 1e-5; ten times the angle would let tessellated columns pass for planes.
-const COPLANAR: f64 = 0.999_990_5;
+pub(super) const COPLANAR: f64 = 0.999_990_5;
 
 /// A coplanar region is not joined to anything less than this share of its area: a wall shall not be tilted by its fillet.
 const FILLET: f64 = 1.0 / 16.0;

@@ -1,8 +1,8 @@
 //! Laying a region flat: projection along its axis, turned to fill the smallest rectangle, cut apart where it
 //! overlaps itself.
 
-use super::charts::{Region, neighbours, segment};
-use super::{LightmapError, UnwrapInput, UnwrapParams, shared_edges};
+use super::charts::{COPLANAR, Region, neighbours, segment};
+use super::{LightmapError, SharedEdge, UnwrapInput, UnwrapParams, shared_edges};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -44,7 +44,8 @@ impl Charts {
     pub fn new(input: &UnwrapInput, params: &UnwrapParams) -> Result<Charts, LightmapError> {
         params.check()?;
         check(input)?;
-        let edges = shared_edges(input.triangles, Some(input.group));
+        let mut edges = shared_edges(input.triangles, Some(input.group));
+        edges.retain(|edge| !is_below_a_wall(input, edge));
         let across = neighbours(input.triangles.len(), &edges);
         let regions = segment(input, &edges, &across, params);
         let mut charts: Vec<Chart> =
@@ -62,6 +63,18 @@ impl Charts {
     pub fn is_empty(&self) -> bool {
         self.charts.is_empty()
     }
+}
+
+/// Whether light breaks at an edge within a plane. A look-up between texels would mix the light of two rooms.
+fn is_below_a_wall(input: &UnwrapInput, edge: &SharedEdge) -> bool {
+    let [s, t] = edge.triangles.map(|t| t as usize);
+    let [i, j] = edge.sides.map(usize::from);
+    let (Some(here), Some(there)) = (input.smooth.get(s), input.smooth.get(t)) else { return false };
+    let normal = |t: usize| {
+        let [a, b, c] = input.triangles[t].map(|v| input.positions[v as usize]);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    here[i] != there[(j + 1) % 3] && here[(i + 1) % 3] != there[j] && normal(s).dot(normal(t)) >= COPLANAR
 }
 
 fn check(input: &UnwrapInput) -> Result<(), LightmapError> {

@@ -39,6 +39,9 @@ pub struct UnwrapInput<'a> {
     pub triangles: &'a [[u32; 3]],
     /// A number for each triangle; charts never cross from one number to another.
     pub group: &'a [u32],
+    /// The smooth vertex of each corner: where two triangles of a plane share none along an edge, a wall stands on it, and
+    /// the chart ends. Empty where no wall does.
+    pub smooth: &'a [[u32; 3]],
 }
 
 /// How to lay out.

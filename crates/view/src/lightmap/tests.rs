@@ -11,7 +11,7 @@ struct Mesh {
 
 impl Mesh {
     fn input(&self) -> UnwrapInput<'_> {
-        UnwrapInput { positions: &self.positions, triangles: &self.triangles, group: &self.group }
+        UnwrapInput { positions: &self.positions, triangles: &self.triangles, group: &self.group, smooth: &[] }
     }
 
     fn add(&mut self, group: u32, corners: &[DVec3], triangles: &[[u32; 3]]) {
@@ -453,4 +453,20 @@ fn thin_shadows_do_not_fall_into_dashes() {
     let after = missing(&fill(atlas.pages[0], &texels, &values));
     assert!(worst(&before) > 0.6 && worst(&after) < 0.12, "{} became {}", worst(&before), worst(&after));
     assert!(texels.len() < 5 * first, "{} from {first}", texels.len());
+}
+
+/// Two rooms on one floor: a look-up beside the wall would read the texels behind it.
+#[test]
+fn charts_end_below_walls() {
+    let corner = |i: u32| DVec3::new(f64::from(i / 2), f64::from(i % 2), 0.0);
+    let mut mesh = Mesh::default();
+    mesh.add(0, &(0..6).map(corner).collect::<Vec<_>>(), &[[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]]);
+    let names = |shift: u32| {
+        mesh.triangles.iter().enumerate().map(|(t, c)| c.map(|v| v + if t < 2 { 0 } else { shift })).collect()
+    };
+    for (shift, expected) in [(0, 1), (6, 2)] {
+        let smooth: Vec<[u32; 3]> = names(shift);
+        let charts = Charts::new(&UnwrapInput { smooth: &smooth, ..mesh.input() }, &UnwrapParams::default()).unwrap();
+        assert_eq!(charts.len(), expected);
+    }
 }
