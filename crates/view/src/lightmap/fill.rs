@@ -22,7 +22,11 @@ pub fn fill(page: [u32; 2], texels: &[Texel], values: &[Bands]) -> Vec<Bands> {
     }
     let mean = |(sum, count): ([f64; 3], u32)| (count > 0).then(|| sum.map(|s| (s / f64::from(count)) as f32));
 
-    let mut pyramid = vec![Level { width, height, known: sums.into_iter().map(mean).collect() }];
+    // A chart continues into the texels around it: rounded texture coordinates give those a weight of a millionth or so,
+    // and the mean of their surroundings may be a bright room's.
+    let known: Vec<_> = sums.into_iter().map(mean).collect();
+    let known = (0..known.len()).map(|i| known[i].or_else(|| beside(&known, width, i))).collect();
+    let mut pyramid = vec![Level { width, height, known }];
     while let Some(last) = pyramid.last().filter(|level| level.width > 1 || level.height > 1) {
         let coarser = last.halved();
         pyramid.push(coarser);
@@ -39,6 +43,19 @@ pub fn fill(page: [u32; 2], texels: &[Texel], values: &[Bands]) -> Vec<Bands> {
         }
     }
     Vec::new()
+}
+
+/// The mean of the known ones among the eight around one.
+fn beside(known: &[Option<Bands>], width: usize, index: usize) -> Option<Bands> {
+    let (x, y, height) = (index % width, index / width, known.len() / width);
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    for y in y.saturating_sub(1)..(y + 2).min(height) {
+        for value in known[y * width..][x.saturating_sub(1)..(x + 2).min(width)].iter().flatten() {
+            sum = std::array::from_fn(|band| sum[band] + value[band]);
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| sum.map(|s: f32| s / count))
 }
 
 struct Level {
