@@ -10,6 +10,14 @@ use crate::{Hit, Ray, Tree};
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{AlphaMode, Mesh, Scene, Side};
 
+/// Hits are at an edge when they lie within so many offsets of it; distances of what meets there are told apart no better
+/// (backs are set back by two offsets).
+const REACH: f64 = 4.0;
+
+/// Hits with weights above this are not looked at more closely. Triangles less high than a ten-thousandth of the scene
+/// may be at an edge all over.
+const EDGE: f32 = 0.02;
+
 /// What a ray met first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Found {
@@ -139,7 +147,47 @@ impl<'a> Tracer<'a> {
         } else {
             self.tree.closest_where(ray, |t, u, v, _| self.stops(t, u, v, seed))
         };
+        let hit = hit.map(|hit| if self.is_at_edge(&hit) { self.nearest_at_edge(ray, hit, seed) } else { hit });
         self.found(hit)
+    }
+
+    /// Whether a hit is so near an edge of its triangle that rounding decides what is met there.
+    #[inline]
+    fn is_at_edge(&self, hit: &Hit) -> bool {
+        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+        if weights.iter().all(|w| *w > EDGE) {
+            return false;
+        }
+        let [a, b, c] = self.mesh.corners(hit.triangle as usize);
+        let doubled = (b - a).cross(c - a).length();
+        let opposite = [c - b, a - c, b - a];
+        (0..3).any(|i| f64::from(weights[i]) * doubled <= REACH * self.offset * opposite[i].length())
+    }
+
+    /// At the foot of a wall its distance and that of the floor behind it are the same but for rounding. Then what lies on
+    /// the other side of another surface there has not been met.
+    #[cold]
+    fn nearest_at_edge(&self, ray: &Ray, hit: Hit, seed: u32) -> Hit {
+        let reach = REACH * self.offset;
+        let within = Ray { t_max: hit.t + reach as f32, ..*ray };
+        let mut met: Vec<Hit> = Vec::new();
+        self.tree.closest_where(&within, |triangle, u, v, back| {
+            if self.stops(triangle, u, v, seed) {
+                met.push(Hit { triangle, u, v, back, t: hit.t });
+            }
+            false
+        });
+        met.sort_unstable_by_key(|hit| hit.triangle);
+        let origin = ray.origin.as_dvec3() + self.centre;
+        let is_behind = |hit: &Hit, wall: &Hit| {
+            let [a, b, c] = self.mesh.corners(hit.triangle as usize);
+            let corner = self.mesh.corners(wall.triangle as usize)[0];
+            let height = |p: DVec3| (p - corner).dot(self.mesh.normal(wall.triangle as usize));
+            let (from, to) = (height(origin), height((a + b + c) / 3.0));
+            from.abs().min(to.abs()) > reach && (from < 0.0) != (to < 0.0)
+        };
+        let is_met = |hit: &&Hit| met.iter().all(|wall| wall.triangle == hit.triangle || !is_behind(hit, wall));
+        if is_met(&&hit) { hit } else { met.iter().find(is_met).copied().unwrap_or(hit) }
     }
 
     /// The first surface that a viewer sees: backs of one-sided surfaces are passed, as viewers cull them.
@@ -197,5 +245,44 @@ impl<'a> Tracer<'a> {
         let at = self.mesh.surface(triangle as usize, DVec2::new(f64::from(u), f64::from(v)));
         let opacity = self.scene.opacity(at);
         opacity >= 1.0 || (opacity > 0.0 && unit(hash(seed ^ hash(triangle))) < opacity)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use radiosity_scene::Material;
+
+    /// Of rays at the foot of a wall one in ten million met the floor behind it, and lit the dark room there.
+    #[test]
+    fn rays_at_the_foot_of_a_wall_do_not_meet_what_is_behind() {
+        let material = Material { double_sided: true, ..Material::default() };
+        let mut scene = Scene { materials: vec![material], ..Scene::default() };
+        let mut quad = |corners: [[f64; 3]; 4]| scene.add_quad("quad", 0, corners.map(DVec3::from));
+        quad([[2., 0., 0.], [4., 0., 0.], [4., 2., 0.], [2., 2., 0.]]);
+        let behind = quad([[0., 0., 0.], [2., 0., 0.], [2., 2., 0.], [0., 2., 0.]]);
+        let walls = [quad([[2., 0., 0.], [2., 2., 0.], [2., 2., 2.], [2., 0., 2.]])];
+        assert_eq!((behind, walls), (1, [2]));
+        for turned in [false, true] {
+            if turned {
+                scene.triangles[4..].iter_mut().for_each(|corners| corners.swap(1, 2));
+            }
+            let mesh = Mesh::new(&scene);
+            let tracer = Tracer::new(&scene, &mesh);
+            let mut floor = 0;
+            for i in 0..100_000u32 {
+                let [x, y, z, at] = [1, 2, 3, 4].map(|k| f64::from(unit(hash(i ^ hash(k)))));
+                let from = DVec3::new(2.1 + 1.9 * x, 2.0 * y, 0.1 + 1.9 * z);
+                // Within a few micrometres of the foot, on either side.
+                let foot = DVec3::new(2.0 + 1e-6 * f64::from(i % 9) - 4e-6, 0.1 + 1.8 * at, 0.0);
+                let place = Place { point: from, normal: DVec3::Z, triangle: u32::MAX };
+                let found = tracer.first(&tracer.ray(&place, (foot - from).normalize(), f64::INFINITY), i);
+                let Found::Surface { triangle, .. } = found else { panic!("{found:?} from {from} to {foot}") };
+                let object = scene.triangle_object[mesh.source[triangle as usize] as usize];
+                assert_ne!(object as usize, behind, "{found:?} from {from} to {foot}");
+                floor += u32::from(object == 0);
+            }
+            assert!((10_000..90_000).contains(&floor), "{floor}");
+        }
     }
 }
