@@ -490,6 +490,104 @@ fn no_light_leaks_into_texels_and_vertices() {
     }
 }
 
+/// Two sealed rooms below one ceiling, between long walls of one piece: a lamp in x < 2, and a double-sided sheet of so many
+/// quads that parts off x > 2. It has an object of its own, called so; the floor is one polygon, or ends at the sheet.
+fn dark_behind_a_sheet(quads: u32, one_floor: bool) -> Scene {
+    let mut scene = room(DVec3::new(4.0, 2.0, 2.0), matte("wall", [0.8; 3], [0.0; 3]));
+    if !one_floor {
+        let mut whole = std::mem::take(&mut scene);
+        scene = Scene { materials: std::mem::take(&mut whole.materials), up: Up::Z, ..Scene::default() };
+        for object in &whole.objects[1..] {
+            let triangles: Vec<[DVec3; 3]> = object.triangles.clone().map(|t| whole.corners(t)).collect();
+            scene.add_triangles(&object.name, 0, &triangles);
+        }
+        for x in [0.0, 2.0] {
+            let floor = [[x, 0., 0.], [x + 2., 0., 0.], [x + 2., 2., 0.], [x, 2., 0.]];
+            scene.add_quad("floor", 0, floor.map(DVec3::from));
+        }
+    }
+    scene.materials.push(Material { double_sided: true, ..matte("sheet", [0.8; 3], [0.0; 3]) });
+    scene.materials.push(matte("lamp", [0.0; 3], [1000.0; 3]));
+    let part = |i: u32| {
+        let [y, v] = [i, i + 1].map(|i| 2.0 * f64::from(i) / f64::from(quads));
+        let [a, b, c, d] = [[2., y, 0.], [2., y, 2.], [2., v, 2.], [2., v, 0.]].map(DVec3::from);
+        [[a, b, c], [a, c, d]]
+    };
+    let sheet: Vec<[DVec3; 3]> = (0..quads).flat_map(part).collect();
+    scene.add_triangles("sheet", 1, &sheet);
+    let lamp = [[0.5, 0.5, 1.9], [0.5, 1.5, 1.9], [1.5, 1.5, 1.9], [1.5, 0.5, 1.9]];
+    scene.add_quad("lamp", 2, lamp.map(DVec3::from));
+    scene
+}
+
+/// A floor in one piece below a wall without thickness carried light into the next room, 0.5 %; and so did one that
+/// ends at the wall, where the wall was divided otherwise than the floor.
+#[test]
+fn no_light_leaks_below_a_sheet_on_one_floor() {
+    for (quads, one_floor) in [(1, true), (5, true), (5, false)] {
+        let scene = dark_behind_a_sheet(quads, one_floor);
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let (mut bright, mut leaked) = ([0f32; 4], [0f32; 4]);
+        let mut count = |way: usize, dark: bool, light: f32| {
+            let most = if dark { &mut leaked[way] } else { &mut bright[way] };
+            *most = most.max(light);
+        };
+
+        let solve = SolveOptions { element_size: Some(0.2), rays: 64, ..SolveOptions::default() };
+        let solution = Solution::new(&tracer, &solve, &()).unwrap();
+        for (e, h) in solution.irradiance().iter().enumerate() {
+            let centre = solution.elements.centre(&mesh, e as u32) + 1e-6 * solution.elements.normal(&mesh, e as u32);
+            count(0, centre.x > 2.0, h[1]);
+        }
+
+        let across =
+            |i: u32| (DVec3::new(1.91 + 0.02 * f64::from(i % 10), 0.07 + 0.2 * f64::from(i / 10), 0.0), DVec3::Z);
+        let points: Vec<_> = (0..100).map(across).collect();
+        let options = MeasureOptions { error: 0.1, solve, ..MeasureOptions::default() };
+        let measured = measure(&tracer, &points, &options, &()).unwrap();
+        for ((point, _), h) in points.iter().zip(&measured.irradiance) {
+            count(1, point.x > 2.0, h[1]);
+        }
+
+        let baked = bake(&tracer, &BakeOptions { error: 0.1, solve, ..BakeOptions::default() }, &()).unwrap();
+        let map = lightmap(&baked, Some(10.0), 4096, &()).unwrap();
+        let vertices = vertex_light(&baked, &()).unwrap();
+        for primitive in map.primitives.iter().chain(&vertices.primitives) {
+            let object = &scene.objects[primitive.object];
+            for corners in &primitive.triangles {
+                let place = |v: u32| {
+                    let vertex = &primitive.vertices[v as usize];
+                    let at = vertex.corners.map(|c| scene.positions[object.vertices.start + c as usize]);
+                    (0..3).map(|k| f64::from(vertex.weights[k]) * at[k]).sum::<DVec3>()
+                };
+                // The front of the sheet looks into the bright room.
+                let [a, b, c] = corners.map(place);
+                let middle = (a + b + c).x / 3.0;
+                let dark = if object.name == "sheet" { primitive.flipped } else { middle > 2.0 };
+                match &primitive.light {
+                    Light::Lightmap { page, uv } => {
+                        let [a, b, c] = corners.map(|v| Vec2::from(uv[v as usize]));
+                        for k in 0..100u16 {
+                            let (u, v) = (f32::from(k % 10) / 9.0, f32::from(k / 10) / 9.0);
+                            let at = a + u * (1.0 - v) * (b - a) + v * (c - a);
+                            count(2, dark, look_up(map.pages[*page], &map.irradiance[*page], at)[1]);
+                        }
+                    }
+                    Light::Vertex { irradiance } => {
+                        corners.iter().for_each(|v| count(3, dark, irradiance[*v as usize][1]));
+                    }
+                    Light::None => panic!("an object came back without light"),
+                }
+            }
+        }
+        for way in 0..4 {
+            assert!(bright[way] > 100.0, "{quads} {one_floor}: {bright:?}");
+            assert!(leaked[way] < 1e-6 * bright[way], "{quads} {one_floor}: {leaked:?} of {bright:?}");
+        }
+    }
+}
+
 /// Irradiance at 500 points of a closed box with two blocks, with references of another program's path tracer (their own
 /// noise is 0.3 %): 1 % was asked, and the audit has to agree with what is found here.
 #[test]
