@@ -5,10 +5,10 @@
 use super::Mesh;
 use glam::DVec3;
 
-/// Triangles in a box, and boxes in the next larger one. Half or twice as many take about the same time.
+/// Triangles in a box, and boxes in the next larger one: fewer make more boxes, more make each look longer.
 const WIDTH: usize = 8;
 
-/// Bits of the curve along each axis.
+/// Bits of the curve along each axis: with those of the size they fit into 64.
 const BITS: u32 = 16;
 
 /// A tree of boxes over the triangles of a mesh.
