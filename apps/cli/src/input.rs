@@ -93,6 +93,16 @@ pub struct PictureArguments {
     /// Camera, by name or number; the first, or one placed by the program, by default.
     #[arg(long, value_name = "NAME|N")]
     pub camera: Option<String>,
+    /// Place of the eye, metres in the scene's axes, instead of a camera of the scene.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "target", conflicts_with = "camera",
+        value_parser = numbers::point)]
+    pub eye: Option<[f64; 3]>,
+    /// Place that the eye looks at.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "eye", value_parser = numbers::point)]
+    pub target: Option<[f64; 3]>,
+    /// Vertical angle of view from the eye; 50 by default.
+    #[arg(long, value_name = "DEGREES", requires = "eye", value_parser = numbers::angle)]
+    pub fov: Option<f64>,
     /// Size; by the camera's aspect if left out.
     #[arg(long, value_parser = numbers::size, value_name = "WxH")]
     pub size: Option<(u32, u32)>,

@@ -28,6 +28,24 @@ pub fn positive(text: &str) -> Result<f64, String> {
     text.parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0).ok_or_else(|| "use a number above 0".to_owned())
 }
 
+/// A place: three finite numbers with commas between.
+pub fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|x| x.trim().parse().ok()).filter(|x: &f64| x.abs() <= 1e9).collect();
+    let is_whole = text.split(',').count() == 3;
+    numbers
+        .try_into()
+        .ok()
+        .filter(|_| is_whole)
+        .ok_or_else(|| "use three numbers, X,Y,Z, such as 1.5,-2,0.8".to_owned())
+}
+
+/// A vertical angle of view, degrees.
+pub fn angle(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|x| (1.0..=170.0).contains(x));
+    value.ok_or_else(|| "use degrees from 1 to 170".to_owned())
+}
+
 /// Texels per metre, within what a layout can hold.
 pub fn density(text: &str) -> Result<f64, String> {
     positive(text).ok().filter(|x| *x <= 1e6).ok_or_else(|| "use a number above 0 and up to 1000000".to_owned())
@@ -45,16 +63,16 @@ pub fn error(text: &str) -> Result<f64, String> {
     })
 }
 
-/// A size in bytes.
+/// A size in bytes. Units are powers of 1024; a number without one is refused, as it may mean anything.
 pub fn bytes(text: &str) -> Result<usize, String> {
-    let wrong = || "use a size such as 500M or 4G".to_owned();
+    let wrong = || "use a size with its unit, such as 500M or 4G, also written 500MiB or 4GB".to_owned();
     let upper = text.to_ascii_uppercase();
     let short = upper.strip_suffix('B').unwrap_or(&upper);
     let short = short.strip_suffix('I').unwrap_or(short);
     let scales = [('K', 1u64 << 10), ('M', 1 << 20), ('G', 1 << 30), ('T', 1 << 40)];
     let scaled = scales.iter().find_map(|(letter, scale)| Some((short.strip_suffix(*letter)?, *scale)));
-    let (number, scale) = scaled.unwrap_or((short, 1));
-    let value = positive(number).map_err(|_| wrong())? * scale as f64;
+    let (number, scale) = scaled.ok_or_else(wrong)?;
+    let value = positive(number.trim_end()).map_err(|_| wrong())? * scale as f64;
     if (1.0..=1e15).contains(&value) { Ok(value as usize) } else { Err(wrong()) }
 }
 
@@ -87,7 +105,15 @@ mod tests {
             [bytes("500M"), bytes("4G"), bytes("4GB"), bytes("4gib")],
             [500 << 20, 4 << 30, 4 << 30, 4 << 30].map(Ok)
         );
-        assert!(bytes("lots").is_err() && bytes("-1G").is_err() && bytes("").is_err());
+        for wrong in ["lots", "-1G", "", "4", "4B", "G"] {
+            assert!(bytes(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!([bytes("500MiB"), bytes("4 GB")], [500 << 20, 4 << 30].map(Ok));
+        assert_eq!(point("1,-2.5, 3e-1"), Ok([1.0, -2.5, 0.3]));
+        for wrong in ["1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1,2,3,", ""] {
+            assert!(point(wrong).is_err(), "{wrong}");
+        }
+        assert!(angle("50") == Ok(50.0) && angle("0").is_err() && angle("180").is_err());
         assert_eq!(size("1280x720"), Ok((1280, 720)));
         assert!(size("0x5").is_err() && size("5").is_err());
         assert_eq!(unit("mm"), Ok(0.001));

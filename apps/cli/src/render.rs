@@ -31,7 +31,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let input = input::load(&arguments.scene, global, progress)?;
     let mesh = Mesh::new(&input.scene);
     let tracer = Tracer::new(&input.scene, &mesh);
-    let camera = views::camera(&input.scene, &tracer, arguments.picture.camera.as_deref())?;
+    let camera = views::camera(&input.scene, &tracer, &arguments.picture)?;
     progress.parts();
     let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
     progress.part("picture");

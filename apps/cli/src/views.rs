@@ -3,6 +3,7 @@
 
 use crate::Failure;
 use crate::illuminance::Illuminance;
+use crate::input::PictureArguments;
 use radiosity::io::image_out::{encode_exr, encode_png};
 use radiosity::{Camera, Picture, Scene, Tracer, View};
 use std::path::Path;
@@ -55,16 +56,30 @@ pub fn encode(path: &Path, picture: &Picture, exposure: f64) -> Result<Vec<u8>, 
     }
 }
 
-/// The camera that was asked for by name or number, else the first, else one that is placed well.
-pub fn camera(scene: &Scene, tracer: &Tracer, wanted: Option<&str>) -> Result<Camera, Failure> {
-    let Some(wanted) = wanted else {
-        return Ok(scene.cameras.first().cloned().unwrap_or_else(|| radiosity::place_camera(tracer)));
+/// Vertical angle of view of `--eye`, degrees, where none is given: wide enough for rooms, without stretched corners.
+const FOV: f64 = 50.0;
+
+/// The camera that was asked for by its places, name or number, else the first, else one that is placed well.
+pub fn camera(scene: &Scene, tracer: &Tracer, asked: &PictureArguments) -> Result<Camera, Failure> {
+    if let (Some(eye), Some(target)) = (asked.eye, asked.target) {
+        if eye == target {
+            return Err(Failure::input("--eye and --target are the same place; the eye must look somewhere"));
+        }
+        let fov = asked.fov.unwrap_or(FOV).to_radians();
+        return Ok(Camera::look_at("eye", eye.into(), target.into(), scene.up.direction(), fov));
+    }
+    let Some(wanted) = &asked.camera else {
+        let aspect = asked.size.map(|(width, height)| f64::from(width) / f64::from(height));
+        return Ok(scene.cameras.first().cloned().unwrap_or_else(|| radiosity::place_camera(tracer, aspect)));
     };
-    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
+    let by_name = scene.cameras.iter().find(|c| c.name == *wanted);
     let by_number = wanted.parse::<usize>().ok().and_then(|n| scene.cameras.get(n));
     by_name.or(by_number).cloned().ok_or_else(|| {
         let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} '{}'", c.name)).collect();
-        let there = if names.is_empty() { "it has none".to_owned() } else { format!("it has {}", names.join(", ")) };
+        let there = match names.is_empty() {
+            true => "it has none; --eye and --target place one".to_owned(),
+            false => format!("it has {}", names.join(", ")),
+        };
         Failure::input(format!("--camera {wanted}: the scene has no such camera; {there}"))
     })
 }

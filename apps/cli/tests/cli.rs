@@ -102,6 +102,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("bake --error 0%", "such as 1%"),
         ("bake --element-size 0", "above 0"),
         ("bake --memory lots", "500M or 4G"),
+        ("bake --memory 4", "a size with its unit, such as 500M or 4G"),
         ("bake --seed one", "invalid digit"),
         ("bake --size 0x5", "1280x720"),
         ("bake --exposure inf", "-60 to 60"),
@@ -119,6 +120,13 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("bake -o out.gltf", "must end in .glb"),
         ("bake --report out.txt", "must end in .json or .html"),
         ("bake --camera 7", "it has 0 'front'"),
+        ("render -o a.png --eye 1,2,3", "--target <X,Y,Z>"),
+        ("render -o a.png --target 1,2,3", "--eye <X,Y,Z>"),
+        ("render -o a.png --fov 30", "--eye <X,Y,Z>"),
+        ("render -o a.png --eye 1,2 --target 1,2,3", "three numbers, X,Y,Z"),
+        ("render -o a.png --eye -1,2,3 --target -1,2,3", "the same place"),
+        ("render -o a.png --eye 1,2,3 --target 0,0,0 --camera front", "cannot be used with"),
+        ("render -o a.png --eye 1,2,3 --target 0,0,0 --fov 200", "degrees from 1 to 170"),
         ("bake --memory 1K", "use larger elements or allow more"),
         ("bake one.obj -o lit.obj", "must end in .glb"),
         ("render", "--output"),
@@ -368,6 +376,18 @@ fn a_picture_is_the_same_by_render_and_by_bake() {
     assert!(room.read("a.png") == room.read("b.png"));
     assert_eq!(room.run(["render", "-o", "a.exr"].iter().chain(&COARSE)).code, Some(0));
     assert_eq!(room.read("a.exr")[..4], [0x76, 0x2f, 0x31, 0x01]);
+}
+
+#[test]
+fn the_eye_is_put_where_it_is_asked() {
+    let room = Room::new("eye");
+    // The room's own camera, in its own words, and one that looks at the lamp.
+    let front = ["--eye", "0.278,0.273,-0.8", "--target", "0.278,0.273,0"];
+    for (name, view) in [("a.exr", &["--camera", "front"][..]), ("b.exr", &[&front[..], &["--fov", "37.86"]].concat())]
+    {
+        assert_eq!(room.run(["render", "-o", name].iter().chain(&COARSE).chain(view)).code, Some(0));
+    }
+    assert!(room.read("a.exr") != room.read("b.exr"), "another angle of view is another picture");
 }
 
 #[test]

@@ -26,6 +26,7 @@ pub mod render;
 mod solution;
 pub mod stations;
 mod vertex_light;
+mod viewpoint;
 
 pub use answer::{Answer, Indirect};
 pub use bake::{BakeOptions, Baked, bake};
@@ -34,9 +35,10 @@ pub use error::Error;
 pub use lightmap::{Lightmap, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};
 pub use monitor::{Monitor, Stages};
-pub use render::{RenderOptions, View, place_camera, render};
+pub use render::{RenderOptions, View, render};
 pub use solution::{Balance, Solution, SolveOptions};
 pub use vertex_light::{VertexLight, vertex_light};
+pub use viewpoint::place_camera;
 
 pub use radiosity_io as io;
 pub use radiosity_scene::{
