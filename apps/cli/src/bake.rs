@@ -10,7 +10,7 @@ use crate::{Failure, Global, numbers};
 use clap::{Args, ValueEnum};
 use radiosity::io::gltf_out::{Encoding, Style, lit_glb};
 use radiosity::io::image_out::encode_exr;
-use radiosity::{Mesh, RenderOptions, Tracer, View};
+use radiosity::{RenderOptions, Tracer, View, counted};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
@@ -25,13 +25,15 @@ pub struct Arguments {
     #[arg(short, long, value_name = "OUT.glb")]
     output: Option<PathBuf>,
     /// Texels per metre of the lightmap; about 200 000 texels in all by default.
-    #[arg(long, value_name = "N", conflicts_with_all = ["vertices", "unlit"], value_parser = numbers::density)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with_all = ["vertices", "unlit"],
+        value_parser = numbers::density)]
     texels_per_metre: Option<f64>,
     /// Largest width and height of a lightmap page.
-    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(16..=16384))]
+    #[arg(long, value_name = "N", default_value_t = 4096, conflicts_with_all = ["vertices", "unlit"],
+        value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_atlas: u32,
     /// How texels are stored: sRGB, or linear for older readers.
-    #[arg(long, value_enum, default_value_t = TexelEncoding::Srgb)]
+    #[arg(long, value_enum, default_value_t = TexelEncoding::Srgb, conflicts_with_all = ["vertices", "unlit"])]
     lightmap_encoding: TexelEncoding,
     /// Write light at the vertices of a refined mesh (attribute _IRRADIANCE, lx) instead of a lightmap.
     #[arg(long)]
@@ -71,8 +73,12 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
     progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
-    let mesh = Mesh::new(&input.scene);
-    let tracer = Tracer::new(&input.scene, &mesh);
+    let tracer = Tracer::new(&input.scene, &input.mesh);
+    let is_json = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let is_exposed = arguments.unlit || !arguments.report.iter().all(is_json);
+    let wants_view = is_exposed || arguments.image.is_some();
+    let is_exposed = is_exposed || arguments.image.as_deref().is_some_and(|path| !views::is_exr(path));
+    arguments.picture.warn_of_what_has_no_effect(wants_view, is_exposed, progress);
     let camera = views::camera(&input.scene, &tracer, &arguments.picture)?;
 
     progress.parts();
@@ -80,8 +86,6 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
 
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");
-    let is_json = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let wants_view = arguments.image.is_some() || arguments.unlit || !arguments.report.iter().all(is_json);
     let (width, height) = views::picture_size(&camera, arguments.picture.size);
     let options = RenderOptions { width, height, ..RenderOptions::default() };
     let look = || radiosity::render(&baked.solution, &baked.field, &camera, &options, progress);
@@ -123,8 +127,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let files = std::iter::once(target.as_path()).chain(pages.iter().map(PathBuf::as_path)).chain(written);
     let files: Vec<&Path> = files.chain(arguments.report.iter().map(PathBuf::as_path)).collect();
 
-    let report =
-        Report::new(&input, &mesh, &arguments.solve, (&baked, view.as_ref()), (&audit, lightmap), &files, progress);
+    let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref()), (&audit, lightmap), &files, progress);
     for path in &arguments.report {
         let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,
@@ -151,11 +154,12 @@ fn page_path(target: &Path, page: usize) -> PathBuf {
 /// The pictures of a page.
 fn plates(view: Option<&View>, camera: &str, report: &Report, exposure: f64) -> Result<Vec<Plate>, Failure> {
     let Some(view) = view.map(views::for_page) else { return Ok(Vec::new()) };
-    let ev = format!("{exposure:+.1}").replace('-', "−");
+    let sign = if exposure > 0.0 { "+" } else { "" };
+    let ev = format!("{sign}{}", numbers::fixed(exposure, 1)).replace('-', "−");
     let from = if camera.is_empty() { String::new() } else { format!(" Camera “{camera}”.") };
     let mut plates = vec![Plate {
         title: "As the eye sees it".to_owned(),
-        note: format!("Luminance, tone-mapped at an exposure of {ev} EV.{from}"),
+        note: format!("Luminance, tone-mapped at an exposure of {ev}\u{a0}EV.{from}"),
         png: views::png(&view.picture, exposure)?,
         has_scale: false,
     }];
@@ -186,8 +190,9 @@ fn tell(report: &Report, global: &Global, progress: &Progress) -> Result<(), Fai
     progress.say(&report.error.line());
     if let Some(map) = report.lightmap.as_ref().filter(|map| map.reduced_charts > 0) {
         progress.say(&format!(
-            "warning: {} charts do not fit on a page at {} texels per metre and got fewer; --max-atlas allows larger pages",
-            map.reduced_charts, map.density
+            "warning: {} not fit on a page at {} texels per metre; --max-atlas allows larger pages",
+            counted(map.reduced_charts, "chart does", "charts do"),
+            map.density
         ));
     }
     let (solution, light) = (&report.solution, &report.illuminance);

@@ -1,10 +1,10 @@
 //! The scene and how to solve it, as the command line says.
 
 use crate::progress::Progress;
-use crate::{Failure, Global, numbers};
+use crate::{Failure, Global, faults, numbers};
 use clap::Args;
 use radiosity::io::{Document, LoadOptions};
-use radiosity::{Faults, Material, Scene, Severity, Sky, Up};
+use radiosity::{Faults, Mesh, Scene, Severity, Sky, Up};
 use std::path::{Path, PathBuf};
 
 /// The scene and how to read it.
@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 pub struct SceneArguments {
     /// .glb, .gltf or .obj; the built-in Cornell box if left out.
     pub scene: Option<PathBuf>,
-    /// Length of one unit of an OBJ: m, cm, mm, in, ft, or a number of metres.
-    #[arg(long, default_value = "m", value_name = "UNIT", value_parser = numbers::unit)]
-    pub unit: f64,
+    /// Length of one unit of an OBJ: m (the default), cm, mm, in, ft, or a number of metres.
+    #[arg(long, value_name = "UNIT", allow_negative_numbers = true, value_parser = numbers::unit)]
+    pub unit: Option<f64>,
     /// Zenith direction: y (glTF's, the default) or z.
     #[arg(long, value_name = "AXIS", value_parser = numbers::up)]
     pub up: Option<Up>,
@@ -33,25 +33,42 @@ impl SceneArguments {
         let sky = self.sky.as_deref().and_then(|sky| sky.strip_prefix("hdr:")).map(Path::new);
         self.scene.as_deref().into_iter().chain(sky).collect()
     }
+
+    /// A call that means something else than it does is not carried out.
+    fn refuse_what_has_no_effect(&self) -> Result<(), Failure> {
+        let is_obj = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+        let named = [("--unit", self.unit.is_some()), ("--obj-double-sided", self.obj_double_sided)];
+        if let Some((option, _)) = named.iter().find(|(_, given)| *given && !self.scene.as_ref().is_some_and(is_obj)) {
+            let why = match *option {
+                "--unit" => "lengths of a glTF and of the built-in scene are metres",
+                _ => "a glTF says by its materials what is two-sided",
+            };
+            return Err(Failure::input(format!("{option} is for .obj files: {why}")));
+        }
+        if self.scene.is_none() && self.up.is_some() {
+            return Err(Failure::input("--up is for scenes from files: the built-in one stands as it is"));
+        }
+        Ok(())
+    }
 }
 
 /// How to solve.
 #[derive(Args, Clone, Debug)]
 pub struct SolveArguments {
     /// Relative error of irradiance to reach, e.g. 1% or 0.01.
-    #[arg(long, default_value = "1%", value_name = "PERCENT", value_parser = numbers::error)]
+    #[arg(long, default_value = "1%", value_name = "PERCENT", allow_hyphen_values = true, value_parser = numbers::error)]
     pub error: f64,
     /// Width of an element in metres, instead of letting the program choose.
-    #[arg(long, value_name = "M", value_parser = numbers::positive)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     pub element_size: Option<f64>,
-    /// Memory for the table of hit ids, e.g. 4G or 500M.
-    #[arg(long, default_value = "4G", value_name = "BYTES", value_parser = numbers::bytes)]
+    /// Memory for the table of hit ids, e.g. 4G or 500M, also written 4GiB or 500MB; powers of 1024.
+    #[arg(long, default_value = "4G", value_name = "BYTES", allow_hyphen_values = true, value_parser = numbers::bytes)]
     pub memory: usize,
     /// Most rounds of refinement.
-    #[arg(long, default_value_t = 5, value_name = "N")]
+    #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true)]
     pub rounds: usize,
     /// Seed of the audit; other seeds examine other points.
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, default_value_t = 1, value_name = "N", allow_negative_numbers = true)]
     pub seed: u64,
 }
 
@@ -111,10 +128,28 @@ pub struct PictureArguments {
     pub exposure: Option<f64>,
 }
 
+impl PictureArguments {
+    /// Tells of options that nothing depends on: all of them where no picture is made, the exposure where none is exposed.
+    pub fn warn_of_what_has_no_effect(&self, is_made: bool, is_exposed: bool, progress: &Progress) {
+        let given = [
+            ("--camera", self.camera.is_some(), is_made),
+            ("--eye", self.eye.is_some(), is_made),
+            ("--size", self.size.is_some(), is_made),
+            ("--exposure", self.exposure.is_some(), is_exposed),
+        ];
+        for (option, ..) in given.iter().filter(|(_, given, acts)| *given && !acts) {
+            let why = if is_made { "EXR holds cd/m² as they are" } else { "no picture is asked for" };
+            progress.say(&format!("warning: {option} has no effect: {why}"));
+        }
+    }
+}
+
 /// A scene that has been read.
 pub struct Input {
     /// The scene.
     pub scene: Scene,
+    /// Its welded triangles.
+    pub mesh: Mesh,
     /// Warnings and notes.
     pub faults: Faults,
     /// The glTF it came from.
@@ -136,37 +171,26 @@ pub fn load(arguments: &SceneArguments, global: &Global, progress: &Progress) ->
 
 /// The same without telling anybody.
 pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
-    let mut input = match &arguments.scene {
-        None => Input {
-            scene: radiosity::cornell_box(),
-            faults: Faults::default(),
-            document: None,
-            title: "built-in Cornell box".to_owned(),
-        },
+    arguments.refuse_what_has_no_effect()?;
+    let (mut scene, mut faults, document, title) = match &arguments.scene {
+        None => (radiosity::cornell_box(), Faults::default(), None, "built-in Cornell box".to_owned()),
         Some(path) => {
             let options = LoadOptions {
-                metres_per_unit: arguments.unit,
+                metres_per_unit: arguments.unit.unwrap_or(1.0),
                 up: arguments.up,
                 obj_double_sided: arguments.obj_double_sided,
                 ..LoadOptions::default()
             };
             let loaded = radiosity::io::load(path, &options)?;
-            Input {
-                scene: loaded.scene,
-                faults: loaded.faults,
-                document: loaded.document,
-                title: path.display().to_string(),
-            }
+            (loaded.scene, loaded.faults, loaded.document, path.display().to_string())
         }
     };
     if let Some(sky) = &arguments.sky {
-        set_sky(&mut input.scene, sky)?;
+        set_sky(&mut scene, sky)?;
     }
-    let scene = &input.scene;
-    if scene.lights.is_empty() && scene.sky.is_black() && !scene.materials.iter().any(Material::emits) {
-        input.faults.warning(input.title.clone(), "there is no light", "give it a sky, --sky overcast:10000, or lamps");
-    }
-    Ok(input)
+    let mesh = Mesh::new(&scene);
+    faults::find(&scene, &mesh, &title, &mut faults);
+    Ok(Input { scene, mesh, faults, document, title })
 }
 
 fn set_sky(scene: &mut Scene, text: &str) -> Result<(), Failure> {

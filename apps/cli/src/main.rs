@@ -2,6 +2,7 @@
 
 mod bake;
 mod check;
+mod faults;
 mod figures;
 mod html;
 mod illuminance;
@@ -36,13 +37,14 @@ struct Cli {
 #[derive(Args, Clone, Debug)]
 pub struct Global {
     /// Threads to use; all processors by default. The answer does not depend on it.
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Progress and result as lines of JSON on standard output.
     #[arg(long, global = true)]
     json: bool,
-    /// Say nothing but errors.
-    #[arg(short, long, global = true)]
+    /// Say nothing but errors; with --json, errors and the result.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// Say more: the rounds of refinement, notes on the input.
     #[arg(short, long, global = true)]
@@ -62,7 +64,10 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse(&error),
+    };
     let progress = progress::Progress::new(&cli.global);
     let result = work(&cli, &progress);
     progress.finish();
@@ -83,6 +88,19 @@ fn main() -> ExitCode {
             ExitCode::from(failure.code)
         }
     }
+}
+
+/// A call that cannot be read, or one for help.
+fn refuse(error: &clap::Error) -> ExitCode {
+    let wants_json = std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| word == "--json");
+    if wants_json && error.use_stderr() {
+        let message = error.to_string().trim_end().to_owned();
+        let event = serde_json::json!({ "event": "error", "exit_code": error.exit_code(), "message": message });
+        let _ = output::print(&event.to_string());
+    }
+    // Where nobody reads, the exit code says it.
+    let _ = error.print();
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
 fn work(cli: &Cli, progress: &progress::Progress) -> Result<(), Failure> {

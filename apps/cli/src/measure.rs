@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use crate::report::ErrorReport;
 use crate::{Failure, Global};
 use clap::Args;
-use radiosity::{Mesh, Tracer, luminance};
+use radiosity::{Tracer, counted, luminance};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -20,9 +20,18 @@ pub struct Arguments {
     /// Points: a CSV with the columns x,y,z,nx,ny,nz (metres; unit of the scene's world).
     #[arg(long, value_name = "P.csv")]
     points: PathBuf,
-    /// The answer: the points with irradiance_r,irradiance_g,irradiance_b,illuminance_lux; standard output if left out.
+    /// The answer: the points with irradiance_r,irradiance_g,irradiance_b,illuminance_lux and the further columns of
+    /// P.csv as they are; standard output if left out.
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
+}
+
+/// Columns of the answer.
+const ANSWER: [&str; 4] = ["irradiance_r", "irradiance_g", "irradiance_b", "illuminance_lux"];
+
+/// A cell as CSV wants it.
+fn cell(text: &str) -> String {
+    if text.contains([',', '"']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 /// Runs the verb.
@@ -34,26 +43,30 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.promise(path, &["csv"])?;
     }
     progress.part("reading");
-    let points = radiosity::io::read_points_csv(&arguments.points)?;
+    let read = radiosity::io::read_points_csv(&arguments.points)?;
+    let points = &read.points;
     let input = input::load(&arguments.scene, global, progress)?;
-    let mesh = Mesh::new(&input.scene);
-    let tracer = Tracer::new(&input.scene, &mesh);
+    let tracer = Tracer::new(&input.scene, &input.mesh);
     let places: Vec<_> = points.iter().map(|p| (p.position, p.normal)).collect();
     progress.parts();
     let measured = radiosity::measure(&tracer, &places, &arguments.solve.measure(), progress)?;
 
-    let mut text = String::from("x,y,z,nx,ny,nz,irradiance_r,irradiance_g,irradiance_b,illuminance_lux");
-    for (point, e) in points.iter().zip(&measured.irradiance) {
+    // A file that was measured before gets its answer anew, not twice.
+    let kept: Vec<usize> = (0..read.names.len()).filter(|&i| !ANSWER.contains(&read.names[i].as_str())).collect();
+    let further = |cells: &[String]| kept.iter().map(|&i| format!(",{}", cell(&cells[i]))).collect::<String>();
+    let mut text = format!("x,y,z,nx,ny,nz,{}{}", ANSWER.join(","), further(&read.names));
+    for ((point, cells), e) in points.iter().zip(&read.cells).zip(&measured.irradiance) {
         let (p, n) = (point.position, point.normal);
         let [r, g, b] = e;
         // Writing to a string cannot fail.
         let _ = write!(text, "\n{},{},{},{},{},{},{r},{g},{b},{}", p.x, p.y, p.z, n.x, n.y, n.z, luminance(*e));
+        text += &further(cells);
     }
     let wrote = match &arguments.output {
         Some(path) => {
             outputs.stage(path, (text + "\n").as_bytes())?;
             outputs.commit()?;
-            Some(format!("wrote {} points to {}", points.len(), path.display()))
+            Some(format!("wrote {} to {}", counted(points.len(), "point", "points"), path.display()))
         }
         None => {
             progress.finish();

@@ -1,6 +1,13 @@
-//! Numbers as people write them on a command line.
+//! Numbers as people write them on a command line, and as they read them.
 
 use radiosity::Up;
+
+/// A number to some decimals; what rounds to zero has no sign.
+pub fn fixed(x: f64, decimals: usize) -> String {
+    let text = format!("{x:.decimals$}");
+    let is_zero = text.chars().all(|c| "-0.".contains(c));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
 
 /// A length of one unit, in metres.
 pub fn unit(text: &str) -> Result<f64, String> {
@@ -113,6 +120,7 @@ mod tests {
         for wrong in ["1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1,2,3,", ""] {
             assert!(point(wrong).is_err(), "{wrong}");
         }
+        assert_eq!([fixed(-0.004, 2), fixed(-0.006, 2), fixed(-10.0, 0)], ["0.00", "-0.01", "-10"]);
         assert!(angle("50") == Ok(50.0) && angle("0").is_err() && angle("180").is_err());
         assert_eq!(size("1280x720"), Ok((1280, 720)));
         assert!(size("0x5").is_err() && size("5").is_err());

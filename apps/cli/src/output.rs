@@ -5,7 +5,8 @@
 //! more. A run that fails or is interrupted leaves no file and changes none that was there.
 
 use crate::Failure;
-use std::fs::{File, canonicalize, remove_file, rename};
+use radiosity::io::Staged;
+use std::fs::{File, canonicalize, remove_file};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -47,7 +48,7 @@ pub fn complain(line: &str) {
 pub struct Outputs {
     inputs: Vec<PathBuf>,
     promised: Vec<PathBuf>,
-    staged: Vec<[PathBuf; 2]>,
+    staged: Vec<Staged>,
 }
 
 impl Outputs {
@@ -85,8 +86,8 @@ impl Outputs {
         }
         // Permissions, a full disk, a read-only one: trying is the only way to know.
         let probe = begin(path);
-        let tried = File::create(&probe);
-        end(&probe);
+        let tried = File::create(probe.beside());
+        end(probe);
         if let Err(error) = tried {
             return refuse(format!("cannot be written: {error}"));
         }
@@ -96,12 +97,9 @@ impl Outputs {
 
     /// Writes bytes beside their place.
     pub fn stage(&mut self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-        let beside = begin(path);
-        self.staged.push([beside.clone(), path.to_owned()]);
-        let written = File::create(&beside).and_then(|mut file| {
-            file.write_all(bytes)?;
-            file.sync_all()
-        });
+        let staged = begin(path);
+        let written = staged.write(bytes);
+        self.staged.push(staged);
         written.map_err(|error| unwritten(path, &error))
     }
 
@@ -109,13 +107,13 @@ impl Outputs {
     pub fn commit(mut self) -> Result<(), Failure> {
         // An interrupt waits until all are there.
         let mut temporary = temporary();
-        if let Some([_, path]) = self.staged.iter().find(|[_, path]| path.is_dir()) {
-            return Err(Failure::work(format!("{}: has become a folder", path.display())));
+        if let Some(staged) = self.staged.iter().find(|staged| staged.target().is_dir()) {
+            return Err(Failure::work(format!("{}: has become a folder", staged.target().display())));
         }
-        while let Some([beside, path]) = self.staged.first() {
-            rename(beside, path).map_err(|error| unwritten(path, &error))?;
-            temporary.retain(|t| t != beside);
-            self.staged.remove(0);
+        for staged in self.staged.drain(..) {
+            let (beside, target) = (staged.beside().to_owned(), staged.target().to_owned());
+            staged.place().map_err(|error| unwritten(&target, &error))?;
+            temporary.retain(|t| *t != beside);
         }
         Ok(())
     }
@@ -123,7 +121,7 @@ impl Outputs {
 
 impl Drop for Outputs {
     fn drop(&mut self) {
-        self.staged.iter().for_each(|[beside, _]| end(beside));
+        self.staged.drain(..).for_each(end);
     }
 }
 
@@ -135,20 +133,17 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A temporary name beside `path`, known to [`interrupt`] before the file exists.
-fn begin(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.tmp", std::process::id()));
-    let beside = path.with_file_name(name);
-    temporary().push(beside.clone());
-    beside
+/// A file for `path`, whose temporary name is known to [`interrupt`] before it exists.
+fn begin(path: &Path) -> Staged {
+    let staged = Staged::new(path);
+    temporary().push(staged.beside().to_owned());
+    staged
 }
 
-fn end(beside: &Path) {
-    // It may never have come to be.
-    let _ = remove_file(beside);
-    temporary().retain(|t| t != beside);
+fn end(staged: Staged) {
+    let beside = staged.beside().to_owned();
+    drop(staged);
+    temporary().retain(|t| *t != beside);
 }
 
 #[cfg(test)]

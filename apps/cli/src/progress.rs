@@ -30,6 +30,8 @@ struct Stage {
     since: Instant,
     /// The library's stages count to the part that the program has named.
     whole: bool,
+    /// The round of refinement, from 1, and how many there are at most; while there is one.
+    round: Option<[usize; 2]>,
     spent: Vec<(String, f64)>,
     part: usize,
     part_since: Instant,
@@ -60,13 +62,14 @@ impl Progress {
         let visible = !global.json && !global.quiet && std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr_with_hz(8) } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(1), target);
-        let template = "{prefix:>14} [{bar:32}] {percent:>3} %  {elapsed} passed, {eta} left";
+        let template = "{prefix:>14} [{bar:32}] {percent:>3} %  {elapsed} passed and {eta} left of this stage";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("=> "));
         }
         let start = Instant::now();
         let spent = Vec::new();
-        let stage = Stage { name: String::new(), since: start, whole: false, spent, part: 0, part_since: start };
+        let stage =
+            Stage { name: String::new(), since: start, whole: false, round: None, spent, part: 0, part_since: start };
         Progress {
             bar,
             json: global.json,
@@ -103,7 +106,7 @@ impl Progress {
     pub fn part(&self, name: &str) {
         let mut stage = self.lock();
         stage.open(name);
-        stage.whole = true;
+        (stage.whole, stage.round) = (true, None);
         drop(stage);
         self.show(name);
     }
@@ -146,16 +149,26 @@ impl Progress {
     fn show(&self, name: &str) {
         let mut stage = self.lock();
         (stage.name, stage.since) = (name.to_owned(), Instant::now());
+        let round = stage.round;
         drop(stage);
         self.bar.reset();
-        self.bar.set_prefix(name.to_owned());
+        self.bar.set_prefix(match round {
+            Some([round, most]) => format!("round {round} of {most} at most: {name}"),
+            None => name.to_owned(),
+        });
         self.last.store(0, Ordering::Relaxed);
         if self.json {
-            self.tell(&json!({ "event": "stage", "stage": name, "seconds": self.seconds() }));
+            self.tell(&json!({
+                "event": "stage", "stage": name, "round": round.map(|r| r[0]), "most_rounds": round.map(|r| r[1]),
+                "seconds": self.seconds(),
+            }));
         }
     }
 
     fn tell(&self, event: &serde_json::Value) {
+        if self.quiet {
+            return;
+        }
         // A listener that has gone does not stop the work: its files are still wanted.
         let _ = output::print(&event.to_string());
     }
@@ -169,6 +182,10 @@ impl Monitor for Progress {
         }
         drop(stage);
         self.show(name);
+    }
+
+    fn round(&self, round: usize, most: usize) {
+        self.lock().round = Some([round, most]);
     }
 
     fn step(&self, done: usize, total: usize) -> bool {

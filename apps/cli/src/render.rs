@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use crate::report::ErrorReport;
 use crate::{Failure, Global, views};
 use clap::Args;
-use radiosity::{Mesh, RenderOptions, Tracer};
+use radiosity::{RenderOptions, Tracer};
 use std::path::PathBuf;
 
 /// Arguments of `render`.
@@ -29,8 +29,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.promise(&arguments.output, &["png", "exr"])?;
     progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
-    let mesh = Mesh::new(&input.scene);
-    let tracer = Tracer::new(&input.scene, &mesh);
+    let tracer = Tracer::new(&input.scene, &input.mesh);
+    arguments.picture.warn_of_what_has_no_effect(true, !views::is_exr(&arguments.output), progress);
     let camera = views::camera(&input.scene, &tracer, &arguments.picture)?;
     progress.parts();
     let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;

@@ -4,7 +4,7 @@ use crate::illuminance::Illuminance;
 use crate::progress::Progress;
 use crate::{figures, input};
 use radiosity::measure::Round;
-use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Mesh, View};
+use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Sky, View};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -58,6 +58,8 @@ pub struct SceneReport {
     pub materials: usize,
     /// Lights, with and without area.
     pub lights: Vec<String>,
+    /// What other light there is: luminous surfaces that are no lights of their own, the sky. Empty for none.
+    pub other_light: Vec<String>,
     /// Area of all surfaces, m².
     pub area: f64,
 }
@@ -225,7 +227,6 @@ impl Report {
     /// Of a bake that is done but for the writing of this report.
     pub fn new(
         input: &input::Input,
-        mesh: &Mesh,
         solve: &input::SolveArguments,
         (baked, view): (&Baked, Option<&View>),
         (written, lightmap): (&Audit, Option<LightmapReport>),
@@ -267,7 +268,8 @@ impl Report {
                 triangles: input.scene.triangles.len(),
                 materials: input.scene.materials.len(),
                 lights: lights.map(|(i, l)| light((i, l.name()))).collect(),
-                area: (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum(),
+                other_light: other_light(input, !solution.luminaires.lights.is_empty()),
+                area: (0..input.mesh.triangles.len()).map(|t| input.mesh.area(t)).sum(),
             },
             error: ErrorReport { finer, ..ErrorReport::new(written, &baked.audit, solve) },
             illuminance,
@@ -297,6 +299,23 @@ impl Report {
             about: figures::ABOUT.iter().copied().collect(),
         }
     }
+}
+
+/// Where light comes from besides the lights.
+fn other_light(input: &input::Input, has_lights: bool) -> Vec<String> {
+    let mut names = Vec::new();
+    if !has_lights && input.scene.materials.iter().any(Material::emits) {
+        names.push("luminous surfaces".to_owned());
+    }
+    if !input.scene.sky.is_black() {
+        let sky = match input.scene.sky {
+            Sky::Uniform(_) => "a uniform sky",
+            Sky::Overcast { .. } => "an overcast sky",
+            _ => "a sky from a picture",
+        };
+        names.push(sky.to_owned());
+    }
+    names
 }
 
 /// The command line as given; the program by its name, wherever it is installed.

@@ -47,9 +47,14 @@ pub fn png(picture: &Picture, exposure: f64) -> Result<Vec<u8>, Failure> {
     encode_png(picture.width, picture.height, &picture.tone_mapped(exposure)).map_err(Failure::work)
 }
 
+/// Whether a picture is to hold luminances as they are.
+pub fn is_exr(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+}
+
 /// The bytes of a picture as its name's ending says.
 pub fn encode(path: &Path, picture: &Picture, exposure: f64) -> Result<Vec<u8>, Failure> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+    if is_exr(path) {
         encode_exr(picture.width, picture.height, &picture.pixels).map_err(Failure::work)
     } else {
         png(picture, exposure)

@@ -120,6 +120,20 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("bake -o out.gltf", "must end in .glb"),
         ("bake --report out.txt", "must end in .json or .html"),
         ("bake --camera 7", "it has 0 'front'"),
+        ("bake --element-size -1", "above 0"),
+        ("bake --texels-per-metre -5", "above 0"),
+        ("bake --error -1%", "such as 1%"),
+        ("bake --memory -1G", "500M or 4G"),
+        ("bake --rounds -1", "invalid digit"),
+        ("bake --threads -1", "1..=1024"),
+        ("bake --unit cm", "--unit is for .obj files"),
+        ("bake a.glb --obj-double-sided", "--obj-double-sided is for .obj files"),
+        ("bake --up z", "--up is for scenes from files"),
+        ("bake --vertices --max-atlas 64", "cannot be used with"),
+        ("bake --unlit --lightmap-encoding linear", "cannot be used with"),
+        ("bake --sky uniform:1 --sky overcast:1", "cannot be used multiple times"),
+        ("check -q -v", "cannot be used with"),
+        ("check .", ".: is a folder (name the .glb"),
         ("render -o a.png --eye 1,2,3", "--target <X,Y,Z>"),
         ("render -o a.png --target 1,2,3", "--eye <X,Y,Z>"),
         ("render -o a.png --fov 30", "--eye <X,Y,Z>"),
@@ -177,6 +191,21 @@ fn outputs_that_cannot_be_written_are_refused_before_the_work() {
         assert!(events[0]["message"].as_str().unwrap().contains(said));
     }
     assert_eq!(room.names(), before);
+}
+
+#[test]
+fn a_call_that_cannot_be_read_is_an_event_too() {
+    let room = Room::new("unread");
+    for call in ["bake --json --error 1", "--json bakke", "render --json"] {
+        let run = room.run(call.split(' '));
+        let events = run.events();
+        assert_eq!((run.code, events.len()), (Some(2), 1), "{call}: {run:?}");
+        assert_eq!((&events[0]["event"], &events[0]["exit_code"]), (&"error".into(), &2.into()));
+        assert!(run.err.starts_with(events[0]["message"].as_str().unwrap()), "{call}: {run:?}");
+    }
+    assert_eq!(room.run(["--json", "--help"]).code, Some(0));
+    let quiet = room.run(["check", "--json", "-q"]);
+    assert_eq!(quiet.events().len(), 1);
 }
 
 #[test]
@@ -261,9 +290,30 @@ fn check_finds_surfaces_in_one_plane() {
     ] {
         room.write(name, &(floor.clone() + &second));
         let said = room.run(["check", name, "--sky", "uniform:1"]).out;
-        assert_eq!(said.contains("lie in one plane with object"), warns, "{said}");
+        assert_eq!(said.contains("in one plane with object"), warns, "{said}");
         assert_eq!(said.contains("warning"), warns, "{said}");
     }
+}
+
+/// Other verbs were silent about what `check` finds.
+#[test]
+fn every_verb_tells_the_same_faults() {
+    let room = Room::new("faults");
+    room.write(
+        "two.obj",
+        "o floor\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 4 3\no rug\nv .2 .1 0\nv .5 .1 0\nv .5 .2 0\nf 5 6 7\n",
+    );
+    let sky = ["two.obj", "--sky", "uniform:100", "--json"];
+    let checked = room.run(["check"].iter().chain(&sky)).result();
+    let said = checked["faults"].to_string();
+    for fault in ["1 edge lies between", "1 triangle lies in one plane with object 'floor', overlaps it and faces"] {
+        assert!(said.contains(fault), "{said}");
+    }
+    let bake = ["bake", "--vertices", "--report", "r.json", "--size", "9x9", "--error", "50%", "--rounds", "0"];
+    let baked = room.run(bake.iter().chain(&sky));
+    assert_eq!(baked.result()["report"]["faults"], checked["faults"]);
+    assert!(baked.out.contains("--size has no effect: no picture"), "{}", baked.out);
+    assert_eq!(baked.result()["report"]["scene"]["other_light"][0], "a uniform sky");
 }
 
 /// Most models from a library have no lamp: their first bake would be black without a word.
@@ -360,6 +410,13 @@ fn measure_answers_on_standard_output_or_in_a_file() {
     let run = room.run(call.iter().chain(&["-o", "e.csv", "-q"]));
     assert_eq!((run.code, run.out.as_str(), run.err.as_str()), (Some(0), "", ""));
     assert_eq!(String::from_utf8(room.read("e.csv")).unwrap().lines().collect::<Vec<_>>(), lines);
+
+    // Further columns are kept; an answer from before is replaced.
+    let named = points.lines().enumerate().map(|(i, line)| format!("7,\"p, {i}\",{line}\n")).collect::<String>();
+    room.write("p.csv", &format!("illuminance_lux,name,x,y,z,nx,ny,nz\n{named}"));
+    let run = room.run(call);
+    let kept: Vec<&str> = run.out.lines().collect();
+    assert_eq!((kept[0], kept[2]), (&*format!("{},name", lines[0]), &*format!("{},\"p, 1\"", lines[2])));
 
     let result = room.run(call.iter().chain(&["--json"])).result();
     assert_eq!(result["irradiance"].as_array().unwrap().len(), 100);

@@ -6,7 +6,7 @@
 
 use crate::options::LoadOptions;
 use glam::{DVec3, Vec2, Vec3};
-use radiosity_scene::{Faults, Object, Scene, Source};
+use radiosity_scene::{Faults, Object, Scene, Source, counted};
 use rustc_hash::FxHashMap;
 
 /// Largest coordinate, metres. Areas are kept in single precision, which ends at 3.4e38; products of two areas of
@@ -104,13 +104,14 @@ impl<'a> Assembly<'a> {
             scene.triangle_source.push(source as u32);
         }
         let place = format!("{place}: object '{}'", part.name);
-        for (number, what, hint) in [
-            (bad_index, "name vertices that do not exist", "export the model again"),
-            (not_finite, "have corners that are not finite", "export the model again"),
-            (flat, "have no area", "remove them in the modeller"),
+        for (number, [one, many], what, hint) in [
+            (bad_index, ["names", "name"], "vertices that do not exist", "export the model again"),
+            (not_finite, ["has", "have"], "corners that are not finite", "export the model again"),
+            (flat, ["has", "have"], "no area", "remove them in the modeller"),
         ] {
             if number > 0 {
-                let what = format!("{number} of {} triangles {what}; dropped", part.triangles.len());
+                let of = counted(part.triangles.len(), "triangle", "triangles");
+                let what = format!("{number} of {of} {} {what}; dropped", if number == 1 { one } else { many });
                 faults.warning(&place, what, hint);
             }
         }
@@ -235,7 +236,8 @@ fn drop_doubled_faces(scene: &mut Scene, file: &str, faults: &mut Faults) {
         twins[side] = Some(triangle as u32);
     }
     if thin_walls > 0 {
-        let what = format!("{thin_walls} faces have a reversed twin on the same three points; both are kept");
+        let faces = counted(thin_walls, "face has", "faces have");
+        let what = format!("{faces} a reversed twin on the same three points; both are kept");
         faults.note(file, what, "fine where a wall without thickness is meant");
     }
     if !any {
@@ -245,7 +247,11 @@ fn drop_doubled_faces(scene: &mut Scene, file: &str, faults: &mut Faults) {
         if count > 0 {
             faults.warning(
                 format!("{file}: object '{}'", object.name),
-                format!("{count} of {} triangles lie exactly on another; dropped", object.triangles.len()),
+                format!(
+                    "{count} of {} {} exactly on another; dropped",
+                    counted(object.triangles.len(), "triangle", "triangles"),
+                    if count == 1 { "lies" } else { "lie" }
+                ),
                 "remove the doubled faces in the modeller",
             );
         }
@@ -314,7 +320,7 @@ mod tests {
         assert_eq!(scene.positions.len(), 4);
         assert!(scene.positions.iter().all(|p| p.is_finite()));
         let text = faults.to_string();
-        for expected in ["2 of 5 triangles name", "1 of 5 triangles have corners", "1 of 5 triangles have no area"] {
+        for expected in ["2 of 5 triangles name", "1 of 5 triangles has corners", "1 of 5 triangles has no area"] {
             assert!(text.contains(expected), "{text}");
         }
     }

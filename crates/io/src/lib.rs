@@ -26,12 +26,14 @@ mod picture;
 mod points;
 mod sky;
 pub mod source;
+mod staged;
 
 pub use bytes::Bytes;
 pub use error::LoadError;
 pub use gltf::{Document, EncodedImage};
 pub use load::{Loaded, load};
 pub use options::LoadOptions;
-pub use points::{Point, parse_points_csv, read_points_csv};
+pub use points::{Point, Points, parse_points_csv, read_points_csv};
 pub use sky::{load_sky_hdr, parse_sky};
 pub use source::{Folder, Memory, Source, SourceError};
+pub use staged::Staged;

@@ -2,7 +2,7 @@
 
 use crate::source::read_plain_file;
 use crate::{Document, Folder, LoadError, LoadOptions, gltf, obj};
-use radiosity_scene::{Faults, Mesh, Scene};
+use radiosity_scene::{Faults, Mesh, Scene, counted};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -53,9 +53,10 @@ fn warn_of_small_triangles(file: &str, scene: &Scene, faults: &mut Faults) {
     for (object, count) in of_object {
         let object = &scene.objects[object as usize];
         let what = format!(
-            "{count} of {} triangles are smaller than the distance within which vertices are sewn together, \
-             {distance:.1e} m (a millionth of the scene's extent); they are left out",
-            object.triangles.len()
+            "{count} of {} {} smaller than the distance within which vertices are sewn together, \
+             {distance:.1e} m (a millionth of the scene's extent), and left out",
+            counted(object.triangles.len(), "triangle", "triangles"),
+            if count == 1 { "is" } else { "are" }
         );
         let hint = "harmless where they are slivers; where they matter, remove what lies far away from them";
         faults.warning(format!("{file}: object '{}'", object.name), what, hint);
@@ -68,6 +69,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let file = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let read = || Ok((read_plain_file(path).map_err(io)?, Folder::of(path).map_err(io)?));
+    if path.is_dir() {
+        return Err(LoadError::one(file, "is a folder", "name the .glb, .gltf or .obj in it"));
+    }
     let mut loaded = match extension.as_str() {
         "glb" | "gltf" => {
             let (bytes, folder) = read()?;

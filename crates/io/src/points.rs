@@ -1,9 +1,9 @@
-//! Points to measure at, from CSV: a header that names x, y, z, nx, ny, nz in any order, further columns allowed.
+//! Points to measure at, from CSV: a header that names x, y, z, nx, ny, nz in any order; further columns are kept.
 
 use crate::LoadError;
 use crate::source::read_plain_file;
 use glam::DVec3;
-use radiosity_scene::Faults;
+use radiosity_scene::{Faults, counted};
 use std::path::Path;
 
 /// Most lines that are named; the rest is counted.
@@ -18,8 +18,19 @@ pub struct Point {
     pub normal: DVec3,
 }
 
+/// The points of a file and what else it says of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Points {
+    /// The points.
+    pub points: Vec<Point>,
+    /// Names of the further columns, as they stand there but without quotes around them.
+    pub names: Vec<String>,
+    /// Their cells by point, each as many as names.
+    pub cells: Vec<Vec<String>>,
+}
+
 /// Reads points from a CSV file. Every bad line is an error with its number.
-pub fn read_points_csv(path: &Path) -> Result<Vec<Point>, LoadError> {
+pub fn read_points_csv(path: &Path) -> Result<Points, LoadError> {
     let bytes = read_plain_file(path).map_err(|error| LoadError::Io { path: path.to_owned(), error })?;
     let file = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
     parse_points_csv(&file, &bytes)
@@ -29,9 +40,10 @@ pub fn read_points_csv(path: &Path) -> Result<Vec<Point>, LoadError> {
 ///
 /// ```
 /// let points = radiosity_io::parse_points_csv("p.csv", b"name,x,y,z,nx,ny,nz\ndesk,1,2,0.75,0,0,2\n").unwrap();
-/// assert_eq!(points[0].normal, glam::DVec3::Z);
+/// assert_eq!(points.points[0].normal, glam::DVec3::Z);
+/// assert_eq!((points.names[0].as_str(), points.cells[0][0].as_str()), ("name", "desk"));
 /// ```
-pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Vec<Point>, LoadError> {
+pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Points, LoadError> {
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let Some((at, header)) = lines.next() else {
@@ -39,8 +51,8 @@ pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Vec<Point>, LoadErro
     };
     // Spreadsheets write semicolons where the comma is the decimal sign, and tabs when copied.
     let separator = [';', '\t'].into_iter().find(|&s| header.contains(s)).unwrap_or(',');
-    let cell = |text: &str| text.trim().trim_matches('"').to_owned();
-    let names: Vec<String> = header.split(separator).map(|name| cell(name).to_ascii_lowercase()).collect();
+    let header = split(header, separator);
+    let names: Vec<String> = header.iter().map(|name| name.to_ascii_lowercase()).collect();
     let wanted = ["x", "y", "z", "nx", "ny", "nz"];
     let columns = wanted.map(|name| names.iter().position(|given| given == name));
     let missing: Vec<&str> = wanted.iter().zip(columns).filter(|(_, at)| at.is_none()).map(|(name, _)| *name).collect();
@@ -50,11 +62,18 @@ pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Vec<Point>, LoadErro
     }
     let columns = columns.map(Option::unwrap_or_default);
 
-    let (mut points, mut bad, mut faults) = (Vec::new(), 0_usize, Faults::default());
+    let further: Vec<usize> = (0..header.len()).filter(|column| !columns.contains(column)).collect();
+    let names = further.iter().map(|&column| header[column].clone()).collect();
+
+    let (mut all, mut bad, mut faults) = (Points { names, ..Points::default() }, 0_usize, Faults::default());
     for (at, line) in lines {
-        let cells: Vec<&str> = line.split(separator).collect();
+        let cells = split(line, separator);
         match point(&cells, columns, separator == ';') {
-            Ok(point) => points.push(point),
+            Ok(point) => {
+                all.points.push(point);
+                // A line may end before its last columns do.
+                all.cells.push(further.iter().map(|&column| cells.get(column).cloned().unwrap_or_default()).collect());
+            }
             Err((what, hint)) => {
                 bad += 1;
                 if bad <= MAX_LINES_NAMED {
@@ -64,18 +83,32 @@ pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Vec<Point>, LoadErro
         }
     }
     if bad > MAX_LINES_NAMED {
-        faults.error(file, format!("and {} more bad lines", bad - MAX_LINES_NAMED), "");
+        faults.error(file, format!("and {}", counted(bad - MAX_LINES_NAMED, "more bad line", "more bad lines")), "");
     }
-    if points.is_empty() && bad == 0 {
+    if all.points.is_empty() && bad == 0 {
         faults.error(file, "has a header and no points", "add a line per point");
     }
-    if faults.has_errors() { Err(LoadError::Faults(faults)) } else { Ok(points) }
+    if faults.has_errors() { Err(LoadError::Faults(faults)) } else { Ok(all) }
 }
 
-fn point(cells: &[&str], columns: [usize; 6], comma: bool) -> Result<Point, (String, &'static str)> {
+/// The cells of a line, without spaces and quotes around them. Between quotes a separator is text, and two quotes are one.
+fn split(line: &str, separator: char) -> Vec<String> {
+    let mut is_quoted = false;
+    let parts = line.split(|c: char| {
+        is_quoted ^= c == '"';
+        c == separator && !is_quoted
+    });
+    let cell = |text: &str| match text.trim().strip_prefix('"').and_then(|text| text.strip_suffix('"')) {
+        Some(inner) => inner.replace("\"\"", "\"").trim().to_owned(),
+        None => text.trim().trim_matches('"').trim().to_owned(),
+    };
+    parts.map(cell).collect()
+}
+
+fn point(cells: &[String], columns: [usize; 6], comma: bool) -> Result<Point, (String, &'static str)> {
     let mut values = [0.0; 6];
     for ((value, column), name) in values.iter_mut().zip(columns).zip(["x", "y", "z", "nx", "ny", "nz"]) {
-        let Some(text) = cells.get(column).map(|text| text.trim().trim_matches('"').trim()) else {
+        let Some(text) = cells.get(column) else {
             return Err((format!("only {} columns, none for {name}", cells.len()), "complete the line"));
         };
         let parsed = if comma { text.replace(',', ".").parse() } else { text.parse() };
@@ -106,12 +139,23 @@ mod tests {
     #[test]
     fn columns_are_found_by_name() {
         let text = "\u{feff}\"NZ\", nx ,ny,id,z,y,x\r\n-3,0,4,first,3,2,1\r\n\r\n1e-300,0,0,b,0,0,0\n";
-        let points = parse_points_csv("p", text.as_bytes()).unwrap();
+        let read = parse_points_csv("p", text.as_bytes()).unwrap();
+        assert_eq!(
+            (read.names, read.cells),
+            (vec!["id".to_owned()], vec![vec!["first".to_owned()], vec!["b".to_owned()]])
+        );
+        let points = read.points;
         assert_eq!(points[0].position, DVec3::new(1.0, 2.0, 3.0));
         assert!((points[0].normal - DVec3::new(0.0, 0.8, -0.6)).length() < 1e-15, "{}", points[0].normal);
         assert_eq!(points[1].normal, DVec3::Z);
         let german = parse_points_csv("p", b"x;y;z;nx;ny;nz\n1,5;0;0;0;1;0\n").unwrap();
-        assert_eq!(german[0].position.x, 1.5);
+        assert_eq!(german.points[0].position.x, 1.5);
+        let quoted =
+            parse_points_csv("p", b"x,y,z,nx,ny,nz,\"the, place\",\n1,0,0,0,1,0,\"a \"\"b\"\", c\"\n").unwrap();
+        assert_eq!(
+            (quoted.names, &quoted.cells[0]),
+            (vec!["the, place".to_owned(), String::new()], &vec!["a \"b\", c".to_owned(), String::new()])
+        );
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::LoadError;
 use crate::source::read_plain_file;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
-use radiosity_scene::{Scene, Sky};
+use radiosity_scene::{Scene, Sky, counted};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -68,7 +68,10 @@ fn parse(file: &str, bytes: &[u8]) -> Result<Sky, LoadError> {
     let pixels: Vec<[f32; 3]> = decoded.into_rgb32f().pixels().map(|p| p.0.map(|v| v / exposure)).collect();
     let bad = pixels.iter().filter(|p| p.iter().any(|v| !v.is_finite())).count();
     if bad > 0 {
-        return Err(wrong(format!("{bad} pixels are not finite"), "export it again, or clip its highlights"));
+        return Err(wrong(
+            format!("{} not finite", counted(bad, "pixel is", "pixels are")),
+            "export it again, or clip its highlights",
+        ));
     }
     let pixels = pixels.into_iter().map(|p| p.map(|v| v.max(0.0))).collect();
     Ok(Sky::Map { width: width as usize, height: height as usize, pixels })

@@ -25,12 +25,12 @@ const SAID: &[(&str, &str)] = &[
     ("not-json.gltf", "not JSON"),
     ("no-asset.gltf", "'asset' is missing"),
     ("version-3.gltf", "version '3.0'"),
-    ("index-out-of-range.gltf", "name vertices that do not exist"),
+    ("index-out-of-range.gltf", "1 of 1 triangle names vertices that do not exist"),
     ("accessor-out-of-range.gltf", "accessors[9]: there are only 2"),
     ("nan-position.gltf", "not finite"),
     ("inf-position.gltf", "not finite"),
     ("coords-1e30.gltf", "1.0000000150474662e30 m"),
-    ("zero-area.gltf", "have no area"),
+    ("zero-area.gltf", "no area; dropped"),
     ("empty-scene.gltf", "no triangle with an area"),
     ("cyclic-nodes.gltf", "nodes[0]: is reached twice"),
     ("self-child.gltf", "nodes[0]: is reached twice"),
@@ -44,12 +44,12 @@ const SAID: &[(&str, &str)] = &[
     ("negative-count.gltf", "count is -3"),
     ("required-extension.gltf", "'XX_unknown' is not supported"),
     ("albedo-above-1.gltf", "clamped to 0..1"),
-    ("obj-index-range.obj", "name a corner that does not exist"),
-    ("obj-index-zero.obj", "name a corner that does not exist"),
+    ("obj-index-range.obj", "with a corner that does not exist"),
+    ("obj-index-zero.obj", "with a corner that does not exist"),
     ("obj-nan.obj", "something else than numbers"),
     ("obj-mtl-missing.obj", "'none.mtl' does not exist"),
     ("obj-mtl-traversal.obj", "leads outside the folder"),
-    ("obj-duplicate-faces.obj", "1 of 3 triangles lie exactly on another"),
+    ("obj-duplicate-faces.obj", "1 of 3 triangles lies exactly on another"),
     ("obj-nonmanifold.obj", ""),
     ("obj-polygon.obj", ""),
 ];
@@ -116,5 +116,5 @@ fn a_file_that_is_not_there_or_of_no_known_kind_is_named() {
     assert!(read("nothing.glb").unwrap_err().to_string().contains("nothing.glb: cannot be read"));
     assert!(read("manifest.json").unwrap_err().to_string().contains("'.json' is no known kind"));
     let folder = load(folder().parent().unwrap(), &LoadOptions::default());
-    assert!(folder.unwrap_err().to_string().contains("no known kind"));
+    assert!(folder.unwrap_err().to_string().contains("is a folder"));
 }

@@ -120,7 +120,7 @@ fn damaged_points_and_skies() {
     assert!(parse_points_csv("t", &csv).is_ok() && parse_sky("t", &hdr).is_ok());
     let mut random = Random(3);
     for _ in 0..20_000 {
-        for point in parse_points_csv("t", &damaged(&csv, &mut random)).unwrap_or_default() {
+        for point in parse_points_csv("t", &damaged(&csv, &mut random)).unwrap_or_default().points {
             assert!(point.position.is_finite() && (point.normal.length() - 1.0).abs() < 1e-9, "{point:?}");
         }
         if let Ok(sky) = parse_sky("t", &damaged(&hdr, &mut random)) {

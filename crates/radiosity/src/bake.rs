@@ -76,6 +76,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     solve.cells = solve.cells.max(CELLS);
     solve.rays = solve.rays.max(rays_for(options.error, 512.0, 32, 2048));
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
+    monitor.round(1, options.rounds + 1);
     let mut solution = Solution::new(tracer, &solve, monitor)?;
     let most_paths = most_paths(options.error);
     let watched: Vec<Station> = stations::spread(&solution, options.audit_points, options.seed as u32);
@@ -132,6 +133,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 watched,
             });
         }
+        monitor.round(rounds.len() + 1, options.rounds + 1);
         shadowing.rays *= 2;
         if noisy {
             solution.refine(next.rays, monitor)?;

@@ -43,7 +43,7 @@ pub use viewpoint::place_camera;
 pub use radiosity_io as io;
 pub use radiosity_scene::{
     AlphaMode, Bands, Camera, Elements, Fault, Faults, Material, Mesh, Object, PointLight, PointLightKind, Projection,
-    Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef, Up, Wrap, luminance,
+    Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef, Up, Wrap, counted, luminance,
 };
 pub use radiosity_solve as solve;
 pub use radiosity_trace::{Found, Place, Tracer};

@@ -134,6 +134,7 @@ pub fn measure(
     solve.variation = solve.variation.min(options.error);
     let mut gather = rays_for(options.error, 4096.0, 32, 16384);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 1024.0, 64, 8192) as u32 };
+    monitor.round(1, options.rounds + 1);
     let mut solution = Solution::new(tracer, &solve, monitor)?;
 
     // The referee looks at every n-th point.
@@ -173,6 +174,7 @@ pub fn measure(
                 bound: solution.info.bound.clone(),
             });
         }
+        monitor.round(rounds.len() + 1, options.rounds + 1);
         gather *= 2;
         shadowing.rays *= 2;
         if smaller.is_some() {

@@ -7,6 +7,8 @@ use std::time::Instant;
 
 /// Sees the stages of a run; may stop it.
 pub trait Monitor: Sync {
+    /// A round of refinement begins, from 1 on; there are `most` of them if the error asked is not reached before.
+    fn round(&self, _round: usize, _most: usize) {}
     /// A stage begins.
     fn stage(&self, _name: &str) {}
     /// `done` of `total` units of the current stage are finished; answers whether to go on.

@@ -594,7 +594,7 @@ fn no_light_leaks_below_a_sheet_on_one_floor() {
 fn points_with_reference_irradiances() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/box");
     let scene = radiosity::io::load(&folder.join("cornell.obj"), &Default::default()).unwrap().scene;
-    let points = radiosity::io::read_points_csv(&folder.join("points.csv")).unwrap();
+    let points = radiosity::io::read_points_csv(&folder.join("points.csv")).unwrap().points;
     let text = std::fs::read_to_string(folder.join("reference.csv")).unwrap();
     let reference: Vec<f64> = text
         .lines()

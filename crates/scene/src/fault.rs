@@ -43,6 +43,11 @@ impl fmt::Display for Fault {
     }
 }
 
+/// A count with its words: `counted(1, "edge lies", "edges lie")`.
+pub fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
 /// All faults of an input, in the order they were met.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(transparent)]

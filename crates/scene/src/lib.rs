@@ -17,7 +17,7 @@ pub mod texture;
 
 pub use camera::{Camera, Projection};
 pub use elements::{ElementId, Elements};
-pub use fault::{Fault, Faults, Severity};
+pub use fault::{Fault, Faults, Severity, counted};
 pub use light::{PointLight, PointLightKind};
 pub use material::{AlphaMode, Material, TextureRef};
 pub use mesh::{Mesh, Side};

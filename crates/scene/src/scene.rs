@@ -1,7 +1,7 @@
 //! A scene, flattened: every placed triangle in world space, with what the author said about it.
 
 use crate::material::MAX_REFLECTANCE;
-use crate::{AlphaMode, Bands, Camera, Faults, Material, PointLight, Sky, Texture, TextureRef};
+use crate::{AlphaMode, Bands, Camera, Faults, Material, PointLight, Sky, Texture, TextureRef, counted};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::ops::Range;
 
@@ -261,7 +261,11 @@ impl Scene {
         for object in &self.objects {
             let bad = self.positions[object.vertices.clone()].iter().filter(|p| !p.is_finite()).count();
             if bad > 0 {
-                faults.error(of(object), format!("{bad} vertices are not finite"), "export the model again");
+                faults.error(
+                    of(object),
+                    format!("{} not finite", counted(bad, "vertex is", "vertices are")),
+                    "export the model again",
+                );
             }
             let flat = object
                 .triangles
@@ -269,7 +273,11 @@ impl Scene {
                 .filter(|&t| self.area(t).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater))
                 .count();
             if flat > 0 {
-                faults.error(of(object), format!("{flat} triangles have no area"), "remove them");
+                faults.error(
+                    of(object),
+                    format!("{} no area", counted(flat, "triangle has", "triangles have")),
+                    "remove them",
+                );
             }
         }
         for material in &self.materials {

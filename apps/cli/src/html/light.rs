@@ -4,6 +4,7 @@ use super::markup::{bars, cards, count, escape, note, number, section, share, ta
 use super::{Plate, plot};
 use crate::figures;
 use crate::illuminance::{Class, Illuminance};
+use crate::numbers::fixed;
 use crate::report::{LightmapReport, Report};
 use base64::Engine;
 
@@ -57,9 +58,9 @@ pub fn illuminance(report: &Report) -> String {
         let row = |(i, class): (usize, &Class)| {
             let (from, to) = (number(class.from), number(class.to));
             let name = match i {
-                0 if light.least < class.from => format!("below {to} lx"),
-                i if i == last && light.largest > class.to => format!("above {from} lx"),
-                _ => format!("{from} – {to} lx"),
+                0 if light.least < class.from => format!("below {to}\u{a0}lx"),
+                i if i == last && light.largest > class.to => format!("above {from}\u{a0}lx"),
+                _ => format!("{from}\u{a0}–\u{a0}{to}\u{a0}lx"),
             };
             (name, plot::bar(&[(&paint(class), class.share / top)]), vec![share(class.share)])
         };
@@ -75,7 +76,10 @@ pub fn illuminance(report: &Report) -> String {
         body += "<h3>By surface</h3>";
         body += &table(&["Object", "Mean, lx", "Least, lx", "Largest, lx", "Uniformity", "Area, m²"], &rows);
         if light.further_surfaces > 0 {
-            body += &note(&format!("{} smaller objects are not listed.", count(light.further_surfaces)));
+            body += &note(&match light.further_surfaces {
+                1 => "1 smaller object is not listed.".to_owned(),
+                n => format!("{} smaller objects are not listed.", count(n)),
+            });
         }
     }
     let referee = match report.error.points {
@@ -95,7 +99,7 @@ fn uniformity(x: f64) -> String {
     match x {
         x if !x.is_finite() => number(x),
         x if x > 0.0 && x < 0.005 => "&lt;\u{202f}0.01".to_owned(),
-        x => format!("{x:.2}"),
+        x => fixed(x, 2),
     }
 }
 

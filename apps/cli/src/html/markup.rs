@@ -2,6 +2,8 @@
 //!
 //! Figures that do not exist (an infinite bound, a time that is not a number) are called unknown.
 
+use crate::numbers::fixed;
+
 /// A section with its heading.
 pub fn section(title: &str, body: &str) -> String {
     format!("<section><h2>{title}</h2>{body}</section>")
@@ -107,14 +109,14 @@ pub fn share(x: f64) -> String {
     match x {
         x if !(100.0 * x).is_finite() => number(f64::NAN),
         x if x > 0.0 && x < 5e-4 => "&lt;\u{202f}0.1\u{a0}%".to_owned(),
-        x => format!("{:.1}\u{a0}%", 100.0 * x),
+        x => format!("{}\u{a0}%", fixed(100.0 * x, 1)),
     }
 }
 
 /// Seconds as people say them.
 pub fn duration(seconds: f64) -> String {
     match seconds {
-        s if (120.0..1e9).contains(&s) => format!("{} min {:02} s", count(s as usize / 60), s as usize % 60),
+        s if (120.0..1e9).contains(&s) => format!("{}\u{a0}min {:02}\u{a0}s", count(s as usize / 60), s as usize % 60),
         s if s > 0.0 && s < 1.0 => with_unit(1e3 * s, "ms"),
         s => with_unit(s, "s"),
     }
@@ -131,7 +133,7 @@ mod tests {
             assert_eq!(number(x).replace(['\u{202f}', '\u{a0}'], " "), text);
         }
         assert_eq!(duration(f64::NAN), "unknown");
-        assert_eq!(duration(125.0), "2 min 05 s");
+        assert_eq!(duration(125.0).replace('\u{a0}', " "), "2 min 05 s");
         assert_eq!(
             [share(0.1234), share(0.0), share(f64::NAN)].map(|s| s.replace('\u{a0}', " ")),
             ["12.3 %", "0.0 %", "unknown"]

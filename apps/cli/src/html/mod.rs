@@ -71,14 +71,19 @@ pub fn page(report: &Report, plates: &[Plate]) -> String {
 fn scene_facts(report: &Report) -> String {
     let scene = &report.scene;
     let lights = match scene.lights.as_slice() {
-        [] => "no lights".to_owned(),
+        [] if scene.other_light.is_empty() => "no light".to_owned(),
+        [] => format!("lit by {}", scene.other_light.join(" and ")),
         few @ ([_] | [_, _] | [_, _, _] | [_, _, _, _]) => {
             format!("{}: {}", plural(few.len(), "light"), escape(&few.join(", ")))
         }
         many => plural(many.len(), "light"),
     };
+    let lights = match scene.lights.is_empty() || scene.other_light.is_empty() {
+        true => lights,
+        false => format!("{lights}, and {}", scene.other_light.join(" and ")),
+    };
     format!(
-        "{} · {} m² of surface · {} · {lights}",
+        "{} · {}\u{a0}m² of surface · {} · {lights}",
         plural(scene.triangles, "triangle"),
         number(scene.area),
         plural(scene.materials, "material")

@@ -31,6 +31,7 @@ fn example(rounds: usize) -> Report {
             triangles: 12_345,
             materials: 7,
             lights: vec!["ceiling & wall".to_owned(), "desk lamp".to_owned()],
+            other_light: Vec::new(),
             area: 164.2,
         },
         error: ErrorReport {

@@ -12,7 +12,7 @@ use super::{Document, extensions, light, material};
 use crate::assemble::{Assembly, Part};
 use crate::{LoadError, LoadOptions, Loaded, Source};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
-use radiosity_scene::{Faults, Material, Source as Origin};
+use radiosity_scene::{Faults, Material, Source as Origin, counted};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -46,8 +46,8 @@ pub fn load(file: &str, bytes: &[u8], source: &dyn Source, options: &LoadOptions
     }
     if meshes.without_material > 0 {
         let what = format!(
-            "{} primitives have no material; they are matte grey of reflectance {}",
-            meshes.without_material,
+            "{} without a material: matte grey of reflectance {}",
+            counted(meshes.without_material, "primitive is", "primitives are"),
             material::UNNAMED_REFLECTANCE
         );
         faults.note(file, what, "give them a material");

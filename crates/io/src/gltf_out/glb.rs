@@ -1,9 +1,8 @@
 //! A glTF in the making: JSON lists and one binary chunk; and the container around them (glTF 2.0, chapter 4).
 
 use super::WriteError;
+use crate::Staged;
 use serde_json::{Map, Value, json};
-use std::fs;
-use std::io::Write;
 use std::path::Path;
 
 /// Appends to the lists of a glTF.
@@ -161,20 +160,9 @@ pub(super) fn save(bytes: &[u8], out: &Path) -> Result<(), WriteError> {
         return Err(WriteError::NoFolder(folder.to_owned()));
     }
     let io = |error| WriteError::Io { path: out.to_owned(), error };
-    let name = out.file_name().ok_or_else(|| io(std::io::ErrorKind::InvalidFilename.into()))?;
-    let mut temporary = std::ffi::OsString::from(".");
-    temporary.push(name);
-    temporary.push(format!(".{}.tmp", std::process::id()));
-    let temporary = folder.join(temporary);
-    let written = fs::File::create(&temporary)
-        .and_then(|mut file| {
-            file.write_all(bytes)?;
-            file.sync_all()
-        })
-        .and_then(|()| fs::rename(&temporary, out));
-    written.map_err(|error| {
-        // The first error is the one to tell; what could not be made cannot always be removed either.
-        let _ = fs::remove_file(&temporary);
-        io(error)
-    })
+    if out.file_name().is_none() {
+        return Err(io(std::io::ErrorKind::InvalidFilename.into()));
+    }
+    let staged = Staged::new(out);
+    staged.write(bytes).and_then(|()| staged.place()).map_err(io)
 }

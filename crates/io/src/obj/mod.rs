@@ -12,7 +12,7 @@ use crate::assemble::{Assembly, Part};
 use crate::{LoadError, LoadOptions, Loaded, Source};
 use glam::{DVec3, Vec2, Vec3};
 use mtl::Library;
-use radiosity_scene::{Faults, Source as Origin};
+use radiosity_scene::{Faults, Source as Origin, counted};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
@@ -176,7 +176,12 @@ impl Lines {
     fn warn(&self, file: &str, what: &str, faults: &mut Faults) {
         if let Some(first) = self.first.first() {
             let more = if self.count > self.first.len() { ", …" } else { "" };
-            let what = format!("{} lines {what} (lines {}{more})", self.count, self.first.join(", "));
+            let what = format!(
+                "{} {what} ({} {}{more})",
+                counted(self.count, "line", "lines"),
+                if self.count == 1 { "line" } else { "lines" },
+                self.first.join(", ")
+            );
             faults.warning(format!("{file}:{first}"), what, "correct them, or export the model again");
         }
     }
@@ -343,12 +348,15 @@ impl<'a> Faces<'a> {
             let what = format!("material '{name}' is in no library; its faces are grey of reflectance {}", mtl::GREY);
             faults.warning(format!("{}:{line}", self.file), what, "add it to the material library");
         }
-        self.bad_indices.warn(self.file, "name a corner that does not exist; their faces are dropped", faults);
-        self.too_short.warn(self.file, "hold a face of fewer than 3 corners; dropped", faults);
+        self.bad_indices.warn(self.file, "with a corner that does not exist; faces dropped", faults);
+        self.too_short.warn(self.file, "with a face of fewer than 3 corners; dropped", faults);
         let most = polygon::MAX_CORNERS;
-        self.too_long.warn(self.file, &format!("hold a face of more than {most} corners; dropped"), faults);
+        self.too_long.warn(self.file, &format!("with a face of more than {most} corners; dropped"), faults);
         if self.without_area.count > 0 {
-            let what = format!("{} points or lines have no area; left out", self.without_area.count);
+            let what = format!(
+                "{} no area; left out",
+                counted(self.without_area.count, "point or line has", "points or lines have")
+            );
             faults.note(self.file, what, "");
         }
     }

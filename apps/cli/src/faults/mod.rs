@@ -1,0 +1,57 @@
+//! What is wrong with a scene beyond what its reader says, told by every verb in the same words.
+
+mod flipped;
+mod overlap;
+
+use radiosity::{Faults, Material, Mesh, Scene, counted};
+use std::collections::HashMap;
+
+/// Adds the faults of a scene that can be read; `title` is what the scene is called.
+pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
+    if scene.lights.is_empty() && scene.sky.is_black() && !scene.materials.iter().any(Material::emits) {
+        faults.warning(title, "there is no light", "give it a sky, --sky overcast:10000, or lamps");
+    }
+    let open = open_edges(mesh);
+    if open > 0 {
+        faults.note(
+            title,
+            format!("{} to one face only: surfaces are open there", counted(open, "edge belongs", "edges belong")),
+            "harmless for rooms with openings; in a solid it lets light in",
+        );
+    }
+    let place = |object: usize| format!("{title}: object '{}'", scene.objects[object].name);
+    for (object, count) in flipped::edges(scene, mesh) {
+        let edges = counted(count, "edge lies", "edges lie");
+        faults.warning(
+            place(object),
+            format!("{edges} between faces that look opposite ways: one shows its black back beside the other's front"),
+            "turn the faces that look the wrong way ('recalculate normals'), or make the material two-sided",
+        );
+    }
+    let overlaps = overlap::search(scene, mesh);
+    for (&object, &(count, on)) in &overlaps.objects {
+        let triangles = counted(count, "triangle lies", "triangles lie");
+        let (on, verbs) =
+            (&scene.objects[on].name, if count == 1 { ["overlaps", "faces"] } else { ["overlap", "face"] });
+        faults.warning(
+            place(object),
+            format!("{triangles} in one plane with object '{on}', {} it and {} the same way", verbs[0], verbs[1]),
+            "which of the two is seen is chance: move one of them by a millimetre, or remove what is covered",
+        );
+    }
+    if overlaps.more {
+        faults.note(title, "too many triangles lie in one place; overlapping surfaces were not all searched for", "");
+    }
+}
+
+/// Edges of the welded mesh that only one face has.
+pub fn open_edges(mesh: &Mesh) -> usize {
+    let mut walked: HashMap<(u32, u32), u32> = HashMap::new();
+    for corners in &mesh.triangles {
+        for i in 0..3 {
+            let (a, b) = (corners[i], corners[(i + 1) % 3]);
+            *walked.entry((a.min(b), a.max(b))).or_default() += 1;
+        }
+    }
+    walked.values().filter(|n| **n == 1).count()
+}
