@@ -24,7 +24,7 @@ pub struct Arguments {
     /// OpenEXR as well, OUT.lightmap0.exr and so on (lx).
     #[arg(short, long, value_name = "OUT.glb")]
     output: Option<PathBuf>,
-    /// Texels per metre of the lightmap; about 200 000 texels in all by default.
+    /// Texels per metre of the lightmap; by default about 200 000 texels in all, and up to 4 million where --error needs them.
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with_all = ["vertices", "unlit"],
         value_parser = numbers::density)]
     texels_per_metre: Option<f64>,
@@ -98,14 +98,14 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
 
     let (mut pages, mut lightmap) = (Vec::new(), None);
-    let (model, audit) = if arguments.vertices || arguments.unlit {
+    let (model, audit, rounds) = if arguments.vertices || arguments.unlit {
         progress.part("vertex light");
         let light = radiosity::vertex_light(&baked, progress)?;
         let style = match arguments.vertices {
             true => Style::Vertices,
             false => Style::Unlit { exposure: exposure.exp2() as f32 },
         };
-        (lit_glb(&input.scene, input.document.as_ref(), &light.primitives, &style), light.audit)
+        (lit_glb(&input.scene, input.document.as_ref(), &light.primitives, &style), light.audit, light.rounds)
     } else {
         progress.part("lightmap");
         let map = radiosity::lightmap(&baked, arguments.texels_per_metre, arguments.max_atlas, progress)?;
@@ -120,14 +120,15 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             pages.push(beside);
         }
         let style = Style::Lightmap { pages: map.images(encoding)?, encoding, exposure: 1.0 };
-        (lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style), map.audit)
+        (lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style), map.audit, map.rounds)
     };
     progress.part("writing");
     outputs.stage(&target, &model.map_err(|error| Failure::work(format!("{}: {error}", target.display())))?)?;
     let files = std::iter::once(target.as_path()).chain(pages.iter().map(PathBuf::as_path)).chain(written);
     let files: Vec<&Path> = files.chain(arguments.report.iter().map(PathBuf::as_path)).collect();
 
-    let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref()), (&audit, lightmap), &files, progress);
+    let written = (&audit, rounds, lightmap);
+    let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref()), written, &files, progress);
     for path in &arguments.report {
         let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,

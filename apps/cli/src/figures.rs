@@ -50,6 +50,11 @@ pub const ABOUT: &[(&str, &str)] = &[
     ("illuminance.mean", "lx; by area, over all exposed surfaces"),
     ("illuminance.classes", "lx; share of the exposed area from one illuminance to another"),
     ("rounds", "after each round of refinement: error as estimated, upper as its one-sided 95 % bound, seconds so far"),
+    (
+        "written_rounds",
+        "error as read back after each attempt; points are texels or vertices, lit those that were not known before",
+    ),
+    ("lightmap.needed", "texels that the error asked would take, about; null where it is met or this is not known"),
     ("balance", "lm by colour band, for a flux of that band alone"),
     ("balance.defect", DEFECT),
     ("solution.element_size", "m; width of an element"),

@@ -4,7 +4,7 @@ use crate::illuminance::Illuminance;
 use crate::progress::Progress;
 use crate::{figures, input};
 use radiosity::measure::Round;
-use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Sky, View};
+use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Sky, View, WrittenRound};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,6 +29,8 @@ pub struct Report {
     pub illuminance: Illuminance,
     /// Rounds of refinement.
     pub rounds: Vec<Round>,
+    /// Attempts at writing the light, each with finer texels or vertices or with more rays than the one before.
+    pub written_rounds: Vec<WrittenRound>,
     /// Where the light goes, lm per band.
     pub balance: Balance,
     /// How the equation was solved.
@@ -195,12 +197,16 @@ pub struct StageReport {
 /// What is said of a lightmap.
 #[derive(Clone, Debug, Serialize)]
 pub struct LightmapReport {
-    /// Texels per metre.
+    /// Texels per metre, at least.
     pub density: f64,
+    /// Texels per metre where light is roughest.
+    pub finest: f64,
     /// Charts too large for a page, which got fewer.
     pub reduced_charts: usize,
-    /// Texels computed.
+    /// Texels that the map has.
     pub texels: usize,
+    /// About how many it would need for the error asked, where it has too few and that is known.
+    pub needed: Option<f64>,
     /// Pages, width and height.
     pub pages: Vec<[u32; 2]>,
     /// Root mean square difference across seams, lx, before fitting.
@@ -214,8 +220,10 @@ impl LightmapReport {
     pub fn new(map: &Lightmap) -> LightmapReport {
         LightmapReport {
             density: map.density,
+            finest: map.finest,
             reduced_charts: map.reduced,
             texels: map.texels,
+            needed: map.needed.filter(|texels| texels.is_finite()),
             pages: map.pages.clone(),
             seams_before: map.seams[0],
             seams_after: map.seams[1],
@@ -229,17 +237,22 @@ impl Report {
         input: &input::Input,
         solve: &input::SolveArguments,
         (baked, view): (&Baked, Option<&View>),
-        (written, lightmap): (&Audit, Option<LightmapReport>),
+        (written, written_rounds, lightmap): (&Audit, Vec<WrittenRound>, Option<LightmapReport>),
         outputs: &[&Path],
         progress: &Progress,
     ) -> Report {
         let solution = &baked.solution;
         let finer = match &lightmap {
-            Some(map) => format!(
-                "the lightmap has {:.1} texels per metre, try --texels-per-metre {:.0}",
-                map.density,
-                (2.0 * map.density).ceil()
-            ),
+            Some(map) => {
+                let needed = map.needed.map_or(String::new(), |texels| format!(" and would need about {texels:.0}"));
+                format!(
+                    "the lightmap has {} texels{needed}, {:.1} to {:.1} per metre, try --texels-per-metre {:.0}",
+                    map.texels,
+                    map.density,
+                    map.finest,
+                    (2.0 * map.density).ceil()
+                )
+            }
             None => format!(
                 "vertices are {:.3} m apart, try --element-size {:.3}",
                 solution.element_size,
@@ -274,6 +287,7 @@ impl Report {
             error: ErrorReport { finer, ..ErrorReport::new(written, &baked.audit, solve) },
             illuminance,
             rounds: baked.rounds.clone(),
+            written_rounds,
             balance,
             solution: SolutionReport {
                 elements: solution.elements.len(),

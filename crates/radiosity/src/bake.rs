@@ -16,7 +16,12 @@ const SMOOTHING: f64 = 2.4;
 const CELLS: usize = 30_000;
 
 /// How often the rays of a gather are doubled before all is made finer.
-const GATHERS: usize = 3;
+pub(crate) const GATHERS: usize = 3;
+
+/// Rays of the first gather.
+pub(crate) fn gather_rays(error: f64) -> usize {
+    rays_for(error, 256.0, 32, 2048)
+}
 
 /// How to bake.
 #[derive(Clone, Copy, Debug)]
@@ -60,9 +65,12 @@ pub struct Baked<'a> {
     /// Time by stage, over all rounds and the audits of what was written.
     pub stages: Stages,
     /// The error asked.
-    error: f64,
-    auditor: Auditor<'a>,
-    watched: Vec<Station>,
+    pub(crate) error: f64,
+    pub(crate) seed: u32,
+    pub(crate) auditor: Auditor<'a>,
+    /// The places of the audit, and the solution's light there.
+    pub(crate) watched: Vec<Station>,
+    pub(crate) light: Vec<Bands>,
 }
 
 /// Solves a scene to an asked error of the irradiance on its surfaces.
@@ -85,22 +93,26 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     loop {
         let field = solution.indirect_field();
         let answer = solution.at(&watched, Indirect::Field(&field), &shadowing, monitor)?;
-        let field_audit = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
+        let mut light = answer.irradiance;
+        let judge = |auditor: &mut Auditor, light: &[Bands]| {
+            certify(auditor, |auditor| auditor.judge(light), options.error, most_paths, &stages, monitor)
+        };
+        let field_audit = judge(&mut auditor, &light)?;
         let mut audit = field_audit.clone();
         let mut gather = 0;
         // The field knows neither contacts below the size of its elements nor normals that are not the faces': gathering at
         // each point does, and costs less than elements that small.
-        let mut rays = rays_for(options.error, 256.0, 32, 2048);
+        let mut rays = gather_rays(options.error);
         for _ in 0..GATHERS {
             if audit.upper <= options.error {
                 break;
             }
             let answer = solution.at(&watched, Indirect::Gather { rays }, &shadowing, monitor)?;
-            let better = certify(&mut auditor, &answer.irradiance, options.error, most_paths, &stages, monitor)?;
+            let better = judge(&mut auditor, &answer.irradiance)?;
             if better.upper >= audit.upper {
                 break;
             }
-            (audit, gather) = (better, rays);
+            (audit, gather, light) = (better, rays, answer.irradiance);
             rays *= 2;
         }
         rounds.push(Round::new(&solution, gather, &shadowing, &audit, start));
@@ -129,8 +141,10 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 rounds,
                 stages,
                 error: options.error,
+                seed: options.seed as u32,
                 auditor,
                 watched,
+                light,
             });
         }
         monitor.round(rounds.len() + 1, options.rounds + 1);
@@ -142,29 +156,5 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             drop(solution);
             solution = Solution::new(tracer, &next, monitor)?;
         }
-    }
-}
-
-impl Baked<'_> {
-    /// How points get their indirect light; a point that is one of `of` whose mean counts does with as many rays less.
-    pub fn indirect(&self, of: usize) -> Indirect<'_> {
-        match self.gather {
-            0 => Indirect::Field(&self.field),
-            rays => Indirect::Gather { rays: (rays / of).max(8) },
-        }
-    }
-
-    /// What the referee says of light as it was written, `read` back at the places of the audit.
-    ///
-    /// # Errors
-    /// [`Error::Stopped`].
-    pub fn judge(&self, monitor: &dyn Monitor, read: impl Fn(&Station) -> Bands) -> Result<Audit, Error> {
-        let read: Vec<Bands> = self.watched.iter().map(read).collect();
-        certify(&mut self.auditor.clone(), &read, self.error, most_paths(self.error), &self.stages, monitor)
-    }
-
-    /// The places of the audit.
-    pub fn watched(&self) -> &[Station] {
-        &self.watched
     }
 }

@@ -15,10 +15,12 @@
 
 pub mod answer;
 pub mod bake;
+mod canvas;
 mod cornell;
 mod division;
 mod error;
 mod faces;
+mod judge;
 mod lightmap;
 pub mod measure;
 mod monitor;
@@ -32,6 +34,7 @@ pub use answer::{Answer, Indirect};
 pub use bake::{BakeOptions, Baked, bake};
 pub use cornell::cornell_box;
 pub use error::Error;
+pub use judge::WrittenRound;
 pub use lightmap::{Lightmap, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};
 pub use monitor::{Monitor, Stages};

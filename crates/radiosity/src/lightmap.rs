@@ -1,19 +1,17 @@
 //! A solution as a lightmap: every texel is lit like a point of the surface.
 
-use crate::answer::Station;
 use crate::bake::Baked;
-use crate::faces::{faces, is_hidden, lit_vertex};
-use crate::{Error, Monitor, stations};
+use crate::canvas::Canvas;
+use crate::faces::lit_vertex;
+use crate::judge::{Judge, STEP, WrittenRound, is_stalled, root_mean_square};
+use crate::{Error, Monitor};
 use glam::DVec2;
 use radiosity_io::gltf_out::{Encoding, Light, LitPrimitive, PageImage};
 use radiosity_io::image_out::encode_png;
 use radiosity_scene::display::srgb;
 use radiosity_scene::{Bands, Side};
-use radiosity_transport::Shadowing;
 use radiosity_view::Audit;
-use radiosity_view::lightmap::{
-    Charts, LightmapError, SeamParams, Texel, UnwrapInput, UnwrapParams, fill, fit_seams, look_up, shared_edges,
-};
+use radiosity_view::lightmap::{Atlas, LightmapError, UnwrapParams};
 use std::collections::HashMap;
 
 /// A lightmap: pages of linear irradiance, and the primitives that refer to them.
@@ -24,14 +22,20 @@ pub struct Lightmap {
     pub irradiance: Vec<Vec<Bands>>,
     /// The primitives to write.
     pub primitives: Vec<LitPrimitive>,
-    /// Texels per metre.
+    /// Texels per metre, at least.
     pub density: f64,
+    /// Texels per metre where light is roughest.
+    pub finest: f64,
     /// Charts that did not fit on a page and got fewer.
     pub reduced: usize,
     /// Texels that were computed.
     pub texels: usize,
     /// What the referee says of the texels as a viewer reads them, before they are stored in 8 bits.
     pub audit: Audit,
+    /// The attempts, each with more texels than the one before.
+    pub rounds: Vec<WrittenRound>,
+    /// About how many texels the error asked would take, if it was missed and this is known.
+    pub needed: Option<f64>,
     /// Root mean square difference across seams, before and after fitting them, lx.
     pub seams: [f64; 2],
 }
@@ -56,28 +60,28 @@ impl Lightmap {
     }
 }
 
-/// Texels that differ from a neighbour by more than this share get more points, as an edge may run through them.
-const EDGE_CONTRAST: f64 = 0.1;
-
-/// How many points: stairs of 1/16 are below what a display shows.
-const EDGE_POINTS: u32 = 16;
-
-/// How often an edge is followed on to further texels.
-const EDGE_ROUNDS: usize = 4;
-
-/// Fewest shadow rays at each of these points.
-const LEAST_RAYS: u32 = 8;
-
 /// Memory that a texel takes while it is worked out, about.
 const TEXEL_BYTES: usize = 400;
 
 /// Texels that the program spends where no density is asked for.
 const AUTOMATIC_TEXELS: f64 = 200_000.0;
 
+/// Most texels that are spent for an error: more than a page of 2048 × 2048 is no lightmap for a room any more.
+const MOST_TEXELS: f64 = 4_000_000.0;
+
+/// By how much the texels that are needed may be estimated too high: maps of double density had 1.6 times less error than
+/// the estimate says.
+const UNSURE: f64 = 2.0;
+
+/// Rounds after the first map: one to light it with more rays, two or three of finer texels, one to mend what the estimate
+/// had wrong.
+const ROUNDS: usize = 5;
+
 /// A vertex of a primitive: its slot, source corners, weights and texture coordinates, the floats by their bits.
 type VertexKey = (usize, [u32; 3], [u32; 3], [u32; 2]);
 
-/// Bakes a solution into a lightmap.
+/// Bakes a solution into a lightmap. Where no density is given, texels are made finer where the light is rough until the
+/// map as it is read back meets the error that the solution was asked for.
 ///
 /// # Errors
 /// [`Error::Stopped`]; [`Error::Lightmap`] if the layout is impossible.
@@ -87,72 +91,63 @@ pub fn lightmap(
     max_page: u32,
     monitor: &dyn Monitor,
 ) -> Result<Lightmap, Error> {
-    let solution = &baked.solution;
-    let (tracer, mesh) = (solution.tracer(), solution.tracer().mesh);
-    let faces = faces(solution);
-    let triangles: Vec<[u32; 3]> =
-        faces.iter().map(|f| f.order().map(|corner| mesh.triangles[f.triangle][corner])).collect();
-    let group: Vec<u32> = faces.iter().map(|f| 2 * f.object as u32 + f.side as u32).collect();
-    let smooth: Vec<[u32; 3]> = faces.iter().map(|f| f.order().map(|corner| mesh.smooth[f.triangle][corner])).collect();
-    let input = UnwrapInput { positions: &mesh.vertices, triangles: &triangles, group: &group, smooth: &smooth };
     let mut params = UnwrapParams { max_page, ..UnwrapParams::default() };
     monitor.stage("unwrap");
-    let charts = Charts::new(&input, &params)?;
+    let mut canvas = Canvas::new(&baked.solution, &params)?;
     params.texels_per_metre =
-        texels_per_metre.or_else(|| charts.density_for(AUTOMATIC_TEXELS)).unwrap_or(params.texels_per_metre);
-    let texels = charts.texel_count(params.texels_per_metre);
-    let most = (solution.memory_allowed() / TEXEL_BYTES) as f64;
+        texels_per_metre.or_else(|| canvas.charts.density_for(AUTOMATIC_TEXELS)).unwrap_or(params.texels_per_metre);
+    let texels = canvas.charts.texel_count(params.texels_per_metre);
+    let most = (baked.solution.memory_allowed() / TEXEL_BYTES) as f64;
     if texels > most {
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
-    let atlas = charts.pack(&params)?;
+    let mut judge = Judge::new(baked);
+    let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
+    let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
+    let mut rounds = vec![drawn.round(&audit)];
 
-    // Every texel is lit like a point of the surface; those inside solids are left to their neighbours.
-    let light = |texels: &[Texel], shadowing: &Shadowing, of: usize| -> Result<Vec<Bands>, Error> {
-        let at: Vec<Station> = texels
-            .iter()
-            .map(|texel| {
-                let face = faces[texel.triangle as usize];
-                stations::station(tracer, face.triangle, face.mesh_uv(texel.uv.as_dvec2()), face.side)
-            })
-            .collect();
-        let mut values = solution.at(&at, baked.indirect(of), shadowing, monitor)?.irradiance;
-        for (value, station) in values.iter_mut().zip(&at) {
-            if is_hidden(solution, station) {
-                *value = [f32::NAN; 3];
-            }
+    // Finer texels while the map misses what the solution has and the texels that are needed can be had.
+    let tolerance = baked.error * root_mean_square(&baked.solution);
+    let mut needed = None;
+    while texels_per_metre.is_none() && rounds.len() <= ROUNDS && !is_stalled(&rounds) {
+        let Some(goal) = judge.goal(&audit, monitor)? else { break };
+        let detail = canvas.detail(&drawn, tolerance);
+        let allot = |left: f64| canvas.charts.allot(&detail.lost, left, &params);
+        let least = allot(goal.left).map_or(f64::INFINITY, |(_, texels)| texels);
+        needed = Some(least);
+        let most = most.min(MOST_TEXELS);
+        let step = allot(goal.left.max(STEP)).filter(|(_, texels)| least <= UNSURE * most && *texels <= most);
+        let Some((finer, _)) = step else { break };
+        monitor.note(&rounds[rounds.len() - 1].to_string());
+        if !goal.relight {
+            canvas.charts.finer = finer;
         }
-        Ok(values)
-    };
-    // The points of a texel that an edge runs through share its shadow rays.
-    let shared = Shadowing { rays: (baked.shadowing.rays / EDGE_POINTS).max(LEAST_RAYS), ..baked.shadowing };
-    let mut irradiance = Vec::new();
-    let mut count = 0;
-    for (page, size) in atlas.pages.iter().enumerate() {
-        let mut texels = atlas.texels(page);
-        count += texels.len();
-        let mut values = light(&texels, &baked.shadowing, 1)?;
-        for _ in 0..EDGE_ROUNDS {
-            let more = atlas.finer(page, &texels, &values, EDGE_CONTRAST, EDGE_POINTS);
-            if more.is_empty() {
-                break;
-            }
-            values.extend(light(&more, &shared, EDGE_POINTS as usize)?);
-            texels.extend(more);
-        }
-        irradiance.push(fill(*size, &texels, &values));
+        drawn = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;
+        audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
+        rounds.push(drawn.round(&audit));
     }
 
-    // Light is continuous across an edge where the two faces share both its smooth vertices.
-    let side: Vec<u32> = faces.iter().map(|f| f.side as u32).collect();
-    let seams = shared_edges(&smooth, Some(&side));
-    monitor.stage("seams");
-    let fitted = fit_seams(&atlas, &seams, &mut irradiance, &SeamParams::default());
+    Ok(Lightmap {
+        primitives: primitives(&canvas, &drawn.atlas),
+        density: params.texels_per_metre,
+        reduced: drawn.atlas.reduced,
+        finest: params.texels_per_metre * canvas.charts.finer.iter().fold(1.0, |most, f| f.max(most)),
+        texels: drawn.texels(),
+        needed: needed.filter(|_| audit.upper > baked.error),
+        audit,
+        seams: [drawn.seams.before, drawn.seams.after],
+        rounds,
+        pages: drawn.atlas.pages,
+        irradiance: drawn.irradiance,
+    })
+}
 
+/// The faces as primitives that refer to the pages.
+fn primitives(canvas: &Canvas, atlas: &Atlas) -> Vec<LitPrimitive> {
     let mut primitives: Vec<LitPrimitive> = Vec::new();
     let mut current: HashMap<(usize, Side, u32), usize> = HashMap::new();
     let mut known: HashMap<VertexKey, u32> = HashMap::new();
-    for (index, face) in faces.iter().enumerate() {
+    for (index, face) in canvas.faces.iter().enumerate() {
         let page = atlas.triangle_page[index];
         let slot = *current.entry((face.object, face.side, page)).or_insert_with(|| {
             primitives.push(LitPrimitive {
@@ -166,7 +161,7 @@ pub fn lightmap(
         });
         let corners = [0, 1, 2].map(|k| {
             let at = [DVec2::ZERO, DVec2::X, DVec2::Y][face.order()[k]];
-            let vertex = lit_vertex(tracer, face.triangle, at);
+            let vertex = lit_vertex(canvas.tracer(), face.triangle, at);
             let uv = atlas.uv[index][k].to_array();
             let key = (slot, vertex.corners, vertex.weights.map(f32::to_bits), uv.map(f32::to_bits));
             let primitive = &mut primitives[slot];
@@ -180,25 +175,7 @@ pub fn lightmap(
         });
         primitives[slot].triangles.push(corners);
     }
-
-    let index: HashMap<(usize, Side), usize> =
-        faces.iter().enumerate().map(|(index, f)| ((f.triangle, f.side), index)).collect();
-    let audit = baked.judge(monitor, |station| {
-        let Some(&index) = index.get(&(station.place.triangle as usize, station.side)) else { return [0.0; 3] };
-        let ([a, b, c], at) = (atlas.uv[index], faces[index].mesh_uv(station.uv).as_vec2());
-        let page = atlas.triangle_page[index] as usize;
-        look_up(atlas.pages[page], &irradiance[page], a + at.x * (b - a) + at.y * (c - a))
-    })?;
-    Ok(Lightmap {
-        pages: atlas.pages.clone(),
-        irradiance,
-        primitives,
-        density: params.texels_per_metre,
-        reduced: atlas.reduced,
-        texels: count,
-        audit,
-        seams: [fitted.before, fitted.after],
-    })
+    primitives
 }
 
 impl From<LightmapError> for Error {

@@ -152,7 +152,8 @@ pub fn measure(
     loop {
         let answer = solution.gathered(&places, gather, &shadowing, monitor)?;
         let watched: Vec<Bands> = watched.iter().map(|&i| answer.irradiance[i]).collect();
-        let audit = certify(&mut auditor, &watched, options.error, most_paths, &stages, monitor)?;
+        let audit =
+            certify(&mut auditor, |auditor| auditor.judge(&watched), options.error, most_paths, &stages, monitor)?;
         rounds.push(Round::new(&solution, gather, &shadowing, &audit, start));
         monitor.note(&rounds[rounds.len() - 1].to_string());
         let achieved = audit.upper <= options.error;
@@ -193,7 +194,12 @@ const STALLED: f64 = 0.9;
 
 /// Whether the last two rounds brought next to nothing.
 pub(crate) fn is_stalled(rounds: &[Round]) -> bool {
-    matches!(rounds, [.., before, _, last] if last.error > STALLED * before.error)
+    brought_nothing(&rounds.iter().map(|round| round.error).collect::<Vec<_>>())
+}
+
+/// The same by their errors.
+pub(crate) fn brought_nothing(errors: &[f64]) -> bool {
+    matches!(errors, [.., before, _, last] if *last > STALLED * before)
 }
 
 /// Paths per estimate that an audit spends at most.
@@ -201,11 +207,11 @@ pub(crate) fn most_paths(error: f64) -> u32 {
     rays_for(error, 4096.0, 64, 1 << 16) as u32
 }
 
-/// Judges an answer, spending the referee's paths while the target lies between the two bounds: taking an estimate for
+/// Has the auditor `judge` an answer, spending the referee's paths while the target lies between the two bounds: taking an estimate for
 /// the truth would refine for the noise of the referee.
 pub(crate) fn certify(
     auditor: &mut Auditor,
-    h: &[Bands],
+    judge: impl Fn(&Auditor) -> Audit,
     target: f64,
     most_paths: u32,
     stages: &Stages,
@@ -217,7 +223,7 @@ pub(crate) fn certify(
             return Err(Error::Stopped);
         }
         loop {
-            let audit = auditor.judge(h);
+            let audit = judge(auditor);
             let open = audit.lower <= target && target < audit.upper && 2 * auditor.paths() <= most_paths;
             if !open {
                 return Ok(audit);

@@ -4,6 +4,10 @@
 //! an answer h, (h − a)(h − b) has the expectation (h − E)²: its mean is an unbiased estimate of the squared error of
 //! everything — mesh, rows, solver, interpolation, leaks — and a·b is one of E². The cost does not depend on the size
 //! of the scene. Its resolution is about σ/K^¼, σ being the referee's own relative noise.
+//!
+//! Where light m is handed out that was read from an answer h, (m − a)(m − b) = (m − h)² + (m − h)(2h − a − b) + (h − a)(h − b), and
+//! the first part needs no referee: its mean is taken over many more places. That is where edges of shadows are, which
+//! hold most of the error on a hundredth of the area, so that K points alone bound it badly.
 
 use crate::Referee;
 use radiosity_scene::{Bands, luminance};
@@ -37,6 +41,8 @@ pub struct Audit {
     pub bias_error: f64,
     /// Mean illuminance at the points by the referee, lux.
     pub mean_illuminance: f64,
+    /// Further places at which what is handed out was compared with the answer that it was read from.
+    pub compared: usize,
 }
 
 /// Referee estimates at a fixed set of points, kept and refined while answers come and go. Judging several answers by
@@ -107,31 +113,50 @@ impl<'a> Auditor<'a> {
         if self.paths == 0 || h.is_empty() {
             return Audit { upper: f64::INFINITY, ..Audit::default() };
         }
-        judge(&self.sums, h, self.paths)
+        judge(&self.sums, h, None, self.paths)
+    }
+
+    /// Judges light `read` from an answer `h` and handed out, both at each place, by what it differs from that answer at
+    /// other places as well: `squares` are squared differences in luminance, lx², at places spread evenly by area.
+    pub fn judge_read(&self, h: &[Bands], read: &[Bands], squares: &[f64]) -> Audit {
+        assert_eq!((self.places.len(), self.places.len()), (h.len(), read.len()));
+        if self.paths == 0 || h.is_empty() || squares.len() < FEWEST_POINTS {
+            return self.judge(read);
+        }
+        judge(&self.sums, read, Some((h, squares)), self.paths)
     }
 }
 
-fn judge(sums: &[[f64; 2]], h: &[Bands], paths: u32) -> Audit {
+fn judge(sums: &[[f64; 2]], m: &[Bands], from: Option<(&[Bands], &[f64])>, paths: u32) -> Audit {
     let n = sums.len() as f64;
-    let pairs: Vec<[f64; 3]> = sums
-        .iter()
-        .zip(h)
-        .map(|([a, b], h)| [a / f64::from(paths), b / f64::from(paths), f64::from(luminance(*h))])
+    let paths_each = f64::from(paths);
+    // Both estimates, the light judged, and what it was read from.
+    let places: Vec<[f64; 4]> = (0..sums.len())
+        .map(|i| {
+            let m_i = f64::from(luminance(m[i]));
+            let h_i = from.map_or(m_i, |(h, _)| f64::from(luminance(h[i])));
+            [sums[i][0] / paths_each, sums[i][1] / paths_each, m_i, h_i]
+        })
         .collect();
-    let mean = |f: &dyn Fn(&[f64; 3]) -> f64| pairs.iter().map(f).sum::<f64>() / n.max(1.0);
-    let deviation = |f: &dyn Fn(&[f64; 3]) -> f64, mean: f64| {
-        (pairs.iter().map(|p| (f(p) - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
+    let mean = |f: &dyn Fn(&[f64; 4]) -> f64| places.iter().map(f).sum::<f64>() / n.max(1.0);
+    let deviation = |f: &dyn Fn(&[f64; 4]) -> f64, mean: f64| {
+        (places.iter().map(|p| (f(p) - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
     };
-    let product = |[a, b, h]: &[f64; 3]| (h - a) * (h - b);
-    let square = mean(&|[a, b, _]| a * b).max(f64::MIN_POSITIVE);
-    let squared_error = mean(&product);
-    let noise = deviation(&product, squared_error);
-    let level = mean(&|[a, b, _]| 0.5 * (a + b));
-    let shift = |[a, b, h]: &[f64; 3]| h - 0.5 * (a + b);
+    let product = |[a, b, m, h]: &[f64; 4]| (m - a) * (m - b) - (m - h) * (m - h);
+    let square = mean(&|[a, b, ..]| a * b).max(f64::MIN_POSITIVE);
+    let squares = from.map_or(&[][..], |(_, squares)| squares);
+    let count = squares.len() as f64;
+    let apart = squares.iter().sum::<f64>() / count.max(1.0);
+    let spread = squares.iter().map(|s| (s - apart).powi(2)).sum::<f64>() / (count * (count - 1.0)).max(1.0);
+    let by_referee = mean(&product);
+    let squared_error = by_referee + apart;
+    let noise = deviation(&product, by_referee).hypot(spread.sqrt());
+    let level = mean(&|[a, b, ..]| 0.5 * (a + b));
+    let shift = |[a, b, m, _]: &[f64; 4]| m - 0.5 * (a + b);
     let bias = mean(&shift);
     if sums.iter().all(|[a, b]| *a == 0.0 && *b == 0.0) {
         // Where the referee finds no light at all, no light is right and any other answer infinitely wrong.
-        let is_dark = pairs.iter().all(|[_, _, h]| *h == 0.0);
+        let is_dark = places.iter().all(|[_, _, m, _]| *m == 0.0);
         let error = if is_dark { 0.0 } else { f64::INFINITY };
         return Audit { points: sums.len(), paths, error, upper: error, ..Audit::default() };
     }
@@ -150,5 +175,6 @@ fn judge(sums: &[[f64; 2]], h: &[Bands], paths: u32) -> Audit {
         bias: bias / level.max(f64::MIN_POSITIVE),
         bias_error: deviation(&shift, bias) / level.max(f64::MIN_POSITIVE),
         mean_illuminance: level,
+        compared: squares.len(),
     }
 }

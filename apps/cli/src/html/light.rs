@@ -111,8 +111,12 @@ pub fn lightmap(map: &LightmapReport) -> String {
                          fitting",
         with_unit(map.seams_before, "lx")
     );
+    let finest = match map.finest > map.density {
+        true => format!("texels along a metre of surface; up to {} where light is rough", with_unit(map.finest, "/m")),
+        false => "texels along a metre of surface".to_owned(),
+    };
     let cards = cards(&[
-        ("Density", with_unit(map.density, "/m"), "texels along a metre of surface"),
+        ("Density", with_unit(map.density, "/m"), &finest),
         ("Texels", count(map.texels), "places on surfaces where light was computed"),
         ("Pages", count(map.pages.len()), &format!("{} texels", pages.join(", "))),
         ("Seams", with_unit(map.seams_after, "lx"), &seams),

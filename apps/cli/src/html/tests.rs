@@ -66,6 +66,7 @@ fn example(rounds: usize) -> Report {
             further_surfaces: 12,
         },
         rounds,
+        written_rounds: Vec::new(),
         balance: Balance {
             emitted: [5200.0, 5000.0, 4100.0],
             from_point_lights: [1200.0, 1300.0, 900.0],
@@ -95,8 +96,10 @@ fn example(rounds: usize) -> Report {
         peak_memory_mb: Some(812.0),
         lightmap: Some(LightmapReport {
             density: 16.0,
+            finest: 64.0,
             reduced_charts: 0,
             texels: 42_000,
+            needed: None,
             pages: vec![[1024, 1024], [512, 256]],
             seams_before: 3.4,
             seams_after: 0.12,

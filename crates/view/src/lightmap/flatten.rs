@@ -10,6 +10,8 @@ use rayon::prelude::*;
 #[derive(Clone, Debug)]
 pub struct Charts {
     pub(super) charts: Vec<Chart>,
+    /// By chart, its texels per metre over those asked for: 1 but where [`Charts::allot`] gave more.
+    pub finer: Vec<f64>,
     pub(super) triangles: usize,
 }
 
@@ -51,7 +53,7 @@ impl Charts {
         let mut charts: Vec<Chart> =
             regions.par_iter().flat_map_iter(|region| flatten(input, &across, region)).collect();
         charts.sort_by_key(|chart| chart.triangles[0]);
-        Ok(Charts { charts, triangles: input.triangles.len() })
+        Ok(Charts { finer: vec![1.0; charts.len()], charts, triangles: input.triangles.len() })
     }
 
     /// Number of charts.

@@ -1,4 +1,5 @@
-//! Lightmaps: every surface of a scene laid out on a few pictures, at the same number of texels per metre everywhere.
+//! Lightmaps: every surface of a scene laid out on a few pictures, at the same number of texels per metre everywhere or
+//! finer where light is rough ([`Charts::allot`]).
 //!
 //! A *chart* is a connected part of one group of triangles that is laid flat in one piece. The ideal chart of
 //! architecture is a maximal coplanar region: it keeps every length and angle, and where it is a rectangle its
@@ -12,6 +13,7 @@
 //! shadows end, [`fill`] the picture and [`fit_seams`] lets both sides of a seam agree. Coordinates: u to the right, v down, texel (x, y) centred at
 //! ((x + ½)/width, (y + ½)/height) as in glTF.
 
+mod allot;
 mod charts;
 mod edges;
 mod fill;
@@ -21,6 +23,7 @@ mod pack;
 mod seams;
 mod texels;
 
+pub use allot::{Detail, GAIN, LOST};
 pub use edges::{SharedEdge, shared_edges};
 pub use fill::{fill, look_up};
 pub use flatten::Charts;
@@ -179,16 +182,11 @@ impl Charts {
         params.check()?;
         let mut reduced = 0;
         let mut charts = Vec::with_capacity(self.charts.len());
-        for chart in &self.charts {
+        for (chart, finer) in self.charts.iter().zip(&self.finer) {
             // Scale to texels; too large a chart gets what a page can hold.
-            let largest = chart.extent.max_element() * params.texels_per_metre;
-            let room = f64::from(params.max_page - 1);
-            let scale = if largest > room {
-                reduced += 1;
-                params.texels_per_metre * room / largest
-            } else {
-                params.texels_per_metre
-            };
+            let most = f64::from(params.max_page - 1) / chart.extent.max_element();
+            reduced += usize::from(params.texels_per_metre > most);
+            let scale = (params.texels_per_metre * finer).min(most);
             let axes =
                 [chart.extent.x, chart.extent.y].map(|extent| axis(extent * scale, chart.rectangle, params.max_page));
             let stretch = DVec2::new(axes[0].stretch, axes[1].stretch) * scale;
@@ -230,15 +228,17 @@ impl Charts {
     /// About how many texels [`Atlas::texels`] will list in all, a little too many for ragged charts; costs neither
     /// the packing nor the memory.
     pub fn texel_count(&self, texels_per_metre: f64) -> f64 {
-        let count = |chart: &flatten::Chart| {
-            let [x, y] = [chart.extent.x, chart.extent.y]
-                .map(|extent| axis(extent * texels_per_metre, chart.rectangle, u32::MAX));
-            let all = f64::from(x.count) * f64::from(y.count);
-            // Area of the chart widened by a bilinear footprint (a square of two texels): Steiner's formula.
-            let widened = (chart.area * texels_per_metre + chart.outline) * texels_per_metre + 4.0;
-            all.min(widened)
-        };
-        self.charts.iter().map(count).sum()
+        (0..self.len()).map(|chart| self.count(chart, texels_per_metre)).sum()
+    }
+
+    /// The same for one chart.
+    fn count(&self, chart: usize, texels_per_metre: f64) -> f64 {
+        let (chart, density) = (&self.charts[chart], texels_per_metre * self.finer[chart]);
+        let [x, y] = [chart.extent.x, chart.extent.y].map(|extent| axis(extent * density, chart.rectangle, u32::MAX));
+        let all = f64::from(x.count) * f64::from(y.count);
+        // Area of the chart widened by a bilinear footprint (a square of two texels): Steiner's formula.
+        let widened = (chart.area * density + chart.outline) * density + 4.0;
+        all.min(widened)
     }
 
     /// The largest density, texels per metre, whose [`Charts::texel_count`] stays within `budget`; `None` where even
@@ -287,6 +287,12 @@ impl Placed {
         );
         let p = if self.at.rotated { DVec2::new(p.y, p.x) } else { p };
         p + DVec2::new(f64::from(self.at.x), f64::from(self.at.y))
+    }
+
+    /// Where texel (x, y), not yet rotated, stands on a page of a width.
+    fn slot(&self, x: u32, y: u32, width: u32) -> usize {
+        let (x, y) = if self.at.rotated { (y, x) } else { (x, y) };
+        (self.at.y + y) as usize * width as usize + (self.at.x + x) as usize
     }
 }
 

@@ -1,0 +1,169 @@
+//! What a lightmap is drawn on: the faces that carry light, laid flat, and how texels are lit. Drawn again with more texels,
+//! it keeps what it knows: only where the map before was rough are texels lit anew.
+
+use crate::answer::Station;
+use crate::faces::{Face, faces, is_hidden};
+use crate::judge::{Judge, WrittenRound};
+use crate::{Error, Monitor, Solution, stations};
+use radiosity_scene::{Bands, Side};
+use radiosity_trace::Tracer;
+use radiosity_view::Audit;
+use radiosity_view::lightmap::{
+    Atlas, Charts, Detail, SeamInfo, SeamParams, SharedEdge, Texel, UnwrapInput, UnwrapParams, fill, fit_seams,
+    look_up, shared_edges,
+};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Texels that differ from a neighbour by more than this share get more points, as an edge may run through them.
+const EDGE_CONTRAST: f64 = 0.1;
+
+/// How many points: stairs of 1/16 are below what a display shows.
+const EDGE_POINTS: u32 = 16;
+
+/// How often an edge is followed on to further texels.
+const EDGE_ROUNDS: usize = 4;
+
+/// The faces of a solution, laid flat.
+pub(crate) struct Canvas<'b, 'a> {
+    solution: &'b Solution<'a>,
+    pub faces: Vec<Face>,
+    pub charts: Charts,
+    /// Edges across which light is continuous: the two faces share both smooth vertices.
+    seams: Vec<SharedEdge>,
+    index: HashMap<(usize, Side), usize>,
+}
+
+/// A canvas with its light.
+pub(crate) struct Drawn {
+    pub atlas: Atlas,
+    /// By page, row-major.
+    pub irradiance: Vec<Vec<Bands>>,
+    /// By page, the texels and the light of each; not a number inside solids.
+    texels: Vec<Vec<Texel>>,
+    values: Vec<Vec<Bands>>,
+    /// The pages before seams were fitted.
+    plain: Vec<Vec<Bands>>,
+    /// Texels that were lit, not read from a map before.
+    pub lit: usize,
+    pub seams: SeamInfo,
+}
+
+impl Drawn {
+    /// Texels in all.
+    pub fn texels(&self) -> usize {
+        self.texels.iter().map(Vec::len).sum()
+    }
+
+    /// What came of it.
+    pub fn round(&self, audit: &Audit) -> WrittenRound {
+        WrittenRound { points: self.texels(), lit: self.lit, error: audit.error, upper: audit.upper }
+    }
+}
+
+impl<'b, 'a> Canvas<'b, 'a> {
+    pub fn new(solution: &'b Solution<'a>, params: &UnwrapParams) -> Result<Canvas<'b, 'a>, Error> {
+        let mesh = solution.tracer().mesh;
+        let faces = faces(solution);
+        let corners = |of: &[[u32; 3]]| -> Vec<[u32; 3]> {
+            faces.iter().map(|f| f.order().map(|corner| of[f.triangle][corner])).collect()
+        };
+        let (triangles, smooth) = (corners(&mesh.triangles), corners(&mesh.smooth));
+        let group: Vec<u32> = faces.iter().map(|f| 2 * f.object as u32 + f.side as u32).collect();
+        let input = UnwrapInput { positions: &mesh.vertices, triangles: &triangles, group: &group, smooth: &smooth };
+        let charts = Charts::new(&input, params)?;
+        let side: Vec<u32> = faces.iter().map(|f| f.side as u32).collect();
+        let seams = shared_edges(&smooth, Some(&side));
+        let index = faces.iter().enumerate().map(|(index, f)| ((f.triangle, f.side), index)).collect();
+        Ok(Canvas { solution, faces, charts, seams, index })
+    }
+
+    /// Lights all texels; those that a map drawn `before` tells well enough are read from it.
+    pub fn draw(
+        &self,
+        params: &UnwrapParams,
+        judge: &Judge,
+        before: Option<(&Drawn, &Detail)>,
+        monitor: &dyn Monitor,
+    ) -> Result<Drawn, Error> {
+        let atlas = self.charts.pack(params)?;
+        let (mut all, mut lights, mut plain, mut lit) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        for (page, size) in atlas.pages.iter().enumerate() {
+            let texels = atlas.texels(page);
+            let known: Vec<Option<Bands>> = match before {
+                Some((older, detail)) => {
+                    texels.par_iter().map(|t| atlas.told(t, &older.atlas, &older.plain, detail)).collect()
+                }
+                None => vec![None; texels.len()],
+            };
+            let fresh: Vec<Texel> = texels.iter().zip(&known).filter(|(_, e)| e.is_none()).map(|(t, _)| *t).collect();
+            let mut fresh = self.light(&fresh, 1, judge, monitor)?.into_iter();
+            lit += fresh.len();
+            let mut values: Vec<Bands> = known.iter().filter_map(|e| e.or_else(|| fresh.next())).collect();
+            let mut points = texels.clone();
+            // What is known gets no more points: it counts twice.
+            for (texel, value) in texels.iter().zip(&known) {
+                if let Some(value) = value {
+                    points.push(*texel);
+                    values.push(*value);
+                }
+            }
+            for _ in 0..EDGE_ROUNDS {
+                let more = atlas.finer(page, &points, &values, EDGE_CONTRAST, EDGE_POINTS);
+                if more.is_empty() {
+                    break;
+                }
+                values.extend(self.light(&more, EDGE_POINTS, judge, monitor)?);
+                points.extend(more);
+            }
+            let picture = fill(*size, &points, &values);
+            let at = |t: &Texel| usize::from(t.y) * size[0] as usize + usize::from(t.x);
+            let mut shows = vec![false; picture.len()];
+            for (point, _) in points.iter().zip(&values).filter(|(_, e)| e[0].is_finite()) {
+                shows[at(point)] = true;
+            }
+            let value = |t: &Texel| if shows[at(t)] { picture[at(t)] } else { [f32::NAN; 3] };
+            lights.push(texels.iter().map(value).collect());
+            all.push(texels);
+            plain.push(picture);
+        }
+        monitor.stage("seams");
+        let mut irradiance = plain.clone();
+        let seams = fit_seams(&atlas, &self.seams, &mut irradiance, &SeamParams::default());
+        Ok(Drawn { atlas, irradiance, texels: all, values: lights, plain, lit, seams })
+    }
+
+    pub fn tracer(&self) -> &'a Tracer<'a> {
+        self.solution.tracer()
+    }
+
+    /// What is rough on a map.
+    pub fn detail(&self, drawn: &Drawn, tolerance: f64) -> Detail {
+        drawn.atlas.detail(&drawn.texels, &drawn.values, tolerance)
+    }
+
+    /// What a viewer reads from a map at a place; nothing where it has no light.
+    pub fn read(&self, drawn: &Drawn, station: &Station) -> Bands {
+        let Some(&index) = self.index.get(&(station.place.triangle as usize, station.side)) else { return [0.0; 3] };
+        let ([a, b, c], at) = (drawn.atlas.uv[index], self.faces[index].mesh_uv(station.uv).as_vec2());
+        let page = drawn.atlas.triangle_page[index] as usize;
+        look_up(drawn.atlas.pages[page], &drawn.irradiance[page], a + at.x * (b - a) + at.y * (c - a))
+    }
+
+    /// Every texel is lit like a point of the surface; those inside solids are left to their neighbours.
+    fn light(&self, texels: &[Texel], of: u32, judge: &Judge, monitor: &dyn Monitor) -> Result<Vec<Bands>, Error> {
+        let solution = self.solution;
+        let station = |texel: &Texel| {
+            let face = self.faces[texel.triangle as usize];
+            stations::station(solution.tracer(), face.triangle, face.mesh_uv(texel.uv.as_dvec2()), face.side)
+        };
+        let at: Vec<Station> = texels.iter().map(station).collect();
+        let mut values = judge.light(&at, of, monitor)?;
+        for (value, station) in values.iter_mut().zip(&at) {
+            if is_hidden(solution, station) {
+                *value = [f32::NAN; 3];
+            }
+        }
+        Ok(values)
+    }
+}

@@ -1,0 +1,221 @@
+//! Light that is written, in texels or at vertices: how points of it are lit, what the referee says of it as it is read
+//! back, and what has to become finer for the error asked.
+//!
+//! The square of the error as read back is the solution's own, at the points that are lit, plus what is lost between them.
+//! Finer texels lessen the second alone; so where the first leaves too little room, points are lit with more rays before.
+
+use crate::answer::Station;
+use crate::bake::{Baked, GATHERS, gather_rays};
+use crate::measure::{brought_nothing, certify, most_paths};
+use crate::{Error, Indirect, Monitor, Solution, stations};
+use radiosity_scene::{Bands, luminance};
+use radiosity_transport::Shadowing;
+use radiosity_view::{Audit, Auditor};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Places at which written light is compared with the solution, for each place of the audit. At a tenth of the cost of a
+/// lightmap they see edges that take up a thousandth of the area.
+const MORE: usize = 20;
+
+/// Part of the squared error asked that the solution may take up where light is written between its points.
+const OWN_SHARE: f64 = 0.5;
+
+/// Part of the squared error that is left to writing that a round aims at: the rest is for what the aim has wrong.
+const AIM: f64 = 0.8;
+
+/// Part of the squared error that writing adds that a round leaves at least: what a thin shadow looks like more closely is seen
+/// step by step.
+pub(crate) const STEP: f64 = 0.1;
+
+/// Whether two rounds in a row brought next to nothing.
+pub(crate) fn is_stalled(rounds: &[WrittenRound]) -> bool {
+    brought_nothing(&rounds.iter().map(|round| round.error).collect::<Vec<_>>())
+}
+
+/// Fewest shadow rays at a point that is one of many.
+const LEAST_RAYS: u32 = 8;
+
+/// One attempt at writing light so that it is read back as well as was asked.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct WrittenRound {
+    /// Texels or vertices.
+    pub points: usize,
+    /// Those of them that were lit; the others were known from the round before.
+    pub lit: usize,
+    /// Estimated error as read back.
+    pub error: f64,
+    /// Its upper bound.
+    pub upper: f64,
+}
+
+impl std::fmt::Display for WrittenRound {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let WrittenRound { points, lit, error, upper } = self;
+        write!(
+            f,
+            "as written {:.2} %, at most {:.2} %: {points} points, {lit} of them lit",
+            100.0 * error,
+            100.0 * upper
+        )
+    }
+}
+
+/// What there is to do for the error asked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Goal {
+    /// Which part may be left of the squared error that writing adds.
+    pub left: f64,
+    /// Whether points are lit with more rays from now on, so that what was lit before is not to be kept.
+    pub relight: bool,
+}
+
+/// What the referee says of light as it was written, attempt by attempt.
+pub(crate) struct Judge<'b, 'a> {
+    baked: &'b Baked<'a>,
+    auditor: Auditor<'a>,
+    gather: usize,
+    shadowing: Shadowing,
+    /// The solution's light at the places of the audit.
+    at: Vec<Bands>,
+    /// Further places where written light is compared with the solution, and its illuminance there.
+    more: Vec<Station>,
+    light: Vec<f64>,
+    /// Whether these are looked at, and whether points were lit with more rays if that helps.
+    is_close: bool,
+    is_relit: bool,
+}
+
+impl<'b, 'a> Judge<'b, 'a> {
+    pub fn new(baked: &'b Baked<'a>) -> Judge<'b, 'a> {
+        Judge {
+            baked,
+            auditor: baked.auditor.clone(),
+            gather: baked.gather,
+            shadowing: baked.shadowing,
+            at: baked.light.clone(),
+            more: stations::spread(&baked.solution, MORE * baked.watched.len(), !baked.seed),
+            light: Vec::new(),
+            is_close: false,
+            is_relit: false,
+        }
+    }
+
+    /// Every place at which light will be read back.
+    pub fn places(&self) -> impl Iterator<Item = &Station> {
+        self.baked.watched.iter().chain(&self.more)
+    }
+
+    /// The solution's light at stations, of which `of` together make the mean that counts, and share their rays.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn light(&self, stations: &[Station], of: u32, monitor: &dyn Monitor) -> Result<Vec<Bands>, Error> {
+        let indirect = match self.gather {
+            0 => Indirect::Field(&self.baked.field),
+            rays => Indirect::Gather { rays: (rays / of as usize).max(8) },
+        };
+        let rays = if of > 1 { (self.shadowing.rays / of).max(LEAST_RAYS) } else { self.shadowing.rays };
+        let shadowing = Shadowing { rays, ..self.shadowing };
+        Ok(self.baked.solution.at(stations, indirect, &shadowing, monitor)?.irradiance)
+    }
+
+    /// Of light that is `read` back at places. Where that seems to be worse than what was asked, and the solution is not,
+    /// it is compared with the solution at many more places, and so is what comes after it.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn audit(&mut self, monitor: &dyn Monitor, read: impl Fn(&Station) -> Bands + Sync) -> Result<Audit, Error> {
+        let Baked { error, stages, watched, achieved, .. } = self.baked;
+        let read_back: Vec<Bands> = watched.par_iter().map(&read).collect();
+        let paths = most_paths(*error);
+        if !self.is_close {
+            let plain = |auditor: &Auditor| auditor.judge(&read_back);
+            let audit = certify(&mut self.auditor, plain, *error, paths, stages, monitor)?;
+            if audit.upper <= *error || !achieved {
+                return Ok(audit);
+            }
+            // The edges that are left may be so narrow that no place of the audit meets one.
+            self.is_close = true;
+        }
+        if self.light.is_empty() {
+            let light = self.light(&self.more, 1, monitor)?;
+            self.light = light.iter().map(|e| f64::from(luminance(*e))).collect();
+        }
+        let apart = |(station, h): (&Station, &f64)| (f64::from(luminance(read(station))) - h).powi(2);
+        let squares: Vec<f64> = self.more.par_iter().zip(&self.light).map(apart).collect();
+        let closely = |auditor: &Auditor| auditor.judge_read(&self.at, &read_back, &squares);
+        certify(&mut self.auditor, closely, *error, paths, stages, monitor)
+    }
+
+    /// What is to be done for the error asked after an audit; nothing where it is met, or cannot be.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn goal(&mut self, audit: &Audit, monitor: &dyn Monitor) -> Result<Option<Goal>, Error> {
+        let asked = self.baked.error;
+        if audit.upper <= asked || !self.baked.achieved {
+            return Ok(None);
+        }
+        let square = |x: f64| x * x;
+        let enough = OWN_SHARE.sqrt() * asked;
+        let at = std::mem::take(&mut self.at);
+        let before = self.certify(&at, enough, monitor)?;
+        self.at = at;
+        let relight = self.look_closer(before.upper, enough, monitor)?;
+        let solution = self.auditor.judge(&self.at);
+        // Squared errors and what the bounds add to them: the first go with the part left, the second, which come from few
+        // places with much of it, with its root q: x q² + y q = what is allowed beyond the solution's own bound.
+        let x = (square(audit.error) - square(before.error)).max(0.0);
+        let y = (square(audit.upper) - square(before.upper) - x).max(0.0);
+        let allowed = AIM * (square(asked) - square(solution.upper));
+        if allowed <= 0.0 || x + y <= 0.0 {
+            return Ok(None);
+        }
+        let q = 2.0 * allowed / (y + (y * y + 4.0 * x * allowed).sqrt());
+        Ok(Some(Goal { left: (q * q).min(AIM), relight }))
+    }
+
+    /// Lights points with more rays, once, if the solution's bound is more than `enough`. Answers whether it does now.
+    fn look_closer(&mut self, mut upper: f64, enough: f64, monitor: &dyn Monitor) -> Result<bool, Error> {
+        if upper <= enough || std::mem::replace(&mut self.is_relit, true) {
+            return Ok(false);
+        }
+        let mut is_better = false;
+        let (mut gather, mut shadowing) = (self.gather, self.shadowing);
+        for _ in 0..GATHERS {
+            gather = (2 * gather).max(gather_rays(self.baked.error));
+            shadowing.rays *= 2;
+            let before = (self.gather, self.shadowing);
+            (self.gather, self.shadowing) = (gather, shadowing);
+            let at = self.light(&self.baked.watched, 1, monitor)?;
+            let audit = self.certify(&at, enough, monitor)?;
+            if audit.upper >= upper {
+                (self.gather, self.shadowing) = before;
+                break;
+            }
+            (self.at, upper, is_better) = (at, audit.upper, true);
+            if upper <= enough {
+                break;
+            }
+        }
+        if is_better {
+            self.light.clear();
+        }
+        Ok(is_better)
+    }
+
+    /// What the referee says of the solution's light `at` its places.
+    fn certify(&mut self, at: &[Bands], target: f64, monitor: &dyn Monitor) -> Result<Audit, Error> {
+        let Baked { error, stages, .. } = self.baked;
+        certify(&mut self.auditor, |auditor| auditor.judge(at), target, most_paths(*error), stages, monitor)
+    }
+}
+
+/// Root mean square illuminance over the exposed surfaces, lx: what relative errors are relative to.
+pub(crate) fn root_mean_square(solution: &Solution) -> f64 {
+    let weight = solution.exposed_area();
+    let square = |(h, w): (&Bands, &f64)| w * f64::from(luminance(*h)).powi(2);
+    let sum: f64 = solution.irradiance().iter().zip(&weight).map(square).sum();
+    (sum / weight.iter().sum::<f64>().max(f64::MIN_POSITIVE)).sqrt()
+}
