@@ -245,12 +245,11 @@ impl Report {
         let finer = match &lightmap {
             Some(map) => {
                 let needed = map.needed.map_or(String::new(), |texels| format!(" and would need about {texels:.0}"));
+                let finest = if map.finest > map.density { format!(" to {:.1}", map.finest) } else { String::new() };
+                let (texels, density, twice) = (map.texels, map.density, (2.0 * map.density).ceil());
                 format!(
-                    "the lightmap has {} texels{needed}, {:.1} to {:.1} per metre, try --texels-per-metre {:.0}",
-                    map.texels,
-                    map.density,
-                    map.finest,
-                    (2.0 * map.density).ceil()
+                    "the lightmap has {texels} texels{needed}, {density:.1}{finest} per metre, try \
+                     --texels-per-metre {twice:.0}"
                 )
             }
             None => format!(

@@ -11,7 +11,7 @@ use radiosity_io::image_out::encode_png;
 use radiosity_scene::display::srgb;
 use radiosity_scene::{Bands, Side};
 use radiosity_view::Audit;
-use radiosity_view::lightmap::{Atlas, LightmapError, UnwrapParams};
+use radiosity_view::lightmap::{Allotment, Atlas, LightmapError, UnwrapParams};
 use std::collections::HashMap;
 
 /// A lightmap: pages of linear irradiance, and the primitives that refer to them.
@@ -69,13 +69,11 @@ const AUTOMATIC_TEXELS: f64 = 200_000.0;
 /// Most texels that are spent for an error: more than a page of 2048 × 2048 is no lightmap for a room any more.
 const MOST_TEXELS: f64 = 4_000_000.0;
 
-/// By how much the texels that are needed may be estimated too high: maps of double density had 1.6 times less error than
-/// the estimate says.
-const UNSURE: f64 = 2.0;
+/// Most texels that are lit in a round: three times what is lit anyway, and then three times as long.
+const MOST_LIT: f64 = 600_000.0;
 
-/// Rounds after the first map: one to light it with more rays, two or three of finer texels, one to mend what the estimate
-/// had wrong.
-const ROUNDS: usize = 5;
+/// Rounds after the first map: two or three of finer texels, one to mend what the estimate had wrong.
+const ROUNDS: usize = 4;
 
 /// A vertex of a primitive: its slot, source corners, weights and texture coordinates, the floats by their bits.
 type VertexKey = (usize, [u32; 3], [u32; 3], [u32; 2]);
@@ -112,16 +110,17 @@ pub fn lightmap(
     while texels_per_metre.is_none() && rounds.len() <= ROUNDS && !is_stalled(&rounds) {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let detail = canvas.detail(&drawn, tolerance);
-        let allot = |left: f64| canvas.charts.allot(&detail.lost, left, &params);
-        let least = allot(goal.left).map_or(f64::INFINITY, |(_, texels)| texels);
-        needed = Some(least);
-        let most = most.min(MOST_TEXELS);
-        let step = allot(goal.left.max(STEP)).filter(|(_, texels)| least <= UNSURE * most && *texels <= most);
-        let Some((finer, _)) = step else { break };
-        monitor.note(&rounds[rounds.len() - 1].to_string());
-        if !goal.relight {
-            canvas.charts.finer = finer;
+        let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
+        let whole = allot(goal.left);
+        needed = Some(whole.as_ref().map_or(f64::INFINITY, |whole| whole.texels));
+        // What cannot be reached is not begun.
+        if whole.is_none_or(|whole| whole.texels > most.min(MOST_TEXELS)) {
+            break;
         }
+        let lit = |step: &Allotment| if goal.relight { step.texels } else { step.rough };
+        let Some(step) = allot(goal.left.max(STEP)).filter(|step| lit(step) <= MOST_LIT) else { break };
+        monitor.note(&rounds[rounds.len() - 1].to_string());
+        canvas.charts.finer = step.finer;
         drawn = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;
         audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
         rounds.push(drawn.round(&audit));

@@ -34,8 +34,8 @@ const MOST_VERTICES: f64 = 1_000_000.0;
 /// Memory that a vertex takes while it is worked out, about.
 const VERTEX_BYTES: usize = 1000;
 
-/// Rounds after the first: one to light vertices with more rays, four of a lattice doubled where light is rough.
-const ROUNDS: usize = 5;
+/// Rounds after the first, each of a lattice doubled where light is rough.
+const ROUNDS: usize = 4;
 
 /// Bakes a solution into the vertices of a refined mesh.
 ///
@@ -63,10 +63,9 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
         monitor.note(&rounds[rounds.len() - 1].to_string());
         if goal.relight {
             known.clear();
-        } else {
-            division = next;
-            lattice = Lattice::new(solution, &faces, &division, &judge);
         }
+        division = next;
+        lattice = Lattice::new(solution, &faces, &division, &judge);
         lit = lattice.light(solution, &judge, &mut known, monitor)?;
         audit = judge.audit(monitor, |station| lattice.read(station))?;
         rounds.push(lattice.round(lit, &audit));

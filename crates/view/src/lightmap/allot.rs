@@ -26,10 +26,23 @@ const MOST_FINER: f64 = 16.0;
 pub struct Detail {
     /// By chart, squared error that is to be feared, (lx)² times texels.
     pub lost: Vec<f64>,
+    /// By chart, share of the texels that are rough.
+    share: Vec<f64>,
     /// By page, row-major: whether a look-up that reads this texel may miss something.
     rough: Vec<Vec<bool>>,
     /// Whether a texel lies inside a solid.
     hidden: Vec<Vec<bool>>,
+}
+
+/// What texels would be spent on.
+#[derive(Clone, Debug)]
+pub struct Allotment {
+    /// By chart, how many times as many texels per metre it gets as were asked for.
+    pub finer: Vec<f64>,
+    /// Texels in all.
+    pub texels: f64,
+    /// Those of them that would have to be lit anew.
+    pub rough: f64,
 }
 
 /// A texel that shows light, lies inside a solid, or is no texel of the chart.
@@ -54,7 +67,7 @@ impl Atlas {
             }
         }
         let mut rough: Vec<Vec<bool>> = self.pages.iter().map(|page| vec![false; area(page)]).collect();
-        let lost = self
+        let (lost, share) = self
             .charts
             .iter()
             .map(|chart| {
@@ -86,11 +99,17 @@ impl Atlas {
                 };
                 (0..rows).for_each(|y| line(columns, &|x| at(x, y)));
                 (0..columns).for_each(|x| line(rows, &|y| at(x, y)));
-                lost
+                let own = (0..rows).flat_map(|y| (0..columns).map(move |x| at(x, y)));
+                let (mut all, mut few) = (0.0, 0.0);
+                for slot in own.filter(|slot| !matches!(slots[*slot], Slot::Empty)) {
+                    all += 1.0;
+                    few += f64::from(u8::from(rough[slot]));
+                }
+                (lost, few / f64::max(all, 1.0))
             })
-            .collect();
+            .unzip();
         let hidden = slots.iter().map(|page| page.iter().map(|slot| matches!(slot, Slot::Hidden)).collect()).collect();
-        Detail { lost, rough, hidden }
+        Detail { lost, share, rough, hidden }
     }
 
     /// What an `older` map of the same charts, its `pictures` by page, tells of a texel: the very same texel where the chart
@@ -125,9 +144,8 @@ impl Atlas {
 }
 
 impl Charts {
-    /// How many times as many texels per metre charts get by what they have `lost` ([`Atlas::detail`]), so that a part `goal`
-    /// of it is left, and how many texels that makes; nothing where pages are too small.
-    pub fn allot(&self, lost: &[f64], goal: f64, params: &UnwrapParams) -> Option<(Vec<f64>, f64)> {
+    /// Finer charts, so that a part `goal` is left of what they have lost; nothing where pages are too small.
+    pub fn allot(&self, detail: &Detail, goal: f64, params: &UnwrapParams) -> Option<Allotment> {
         let all = 0..self.len();
         let density = |k: usize| self.finer[k] * params.texels_per_metre;
         let room = f64::from(params.max_page - 1);
@@ -138,7 +156,7 @@ impl Charts {
             })
             .collect();
         // What is lost by area, for the texels of charts are not of one size.
-        let lost: Vec<f64> = all.clone().map(|k| lost[k] / density(k).powi(2)).collect();
+        let lost: Vec<f64> = all.clone().map(|k| detail.lost[k] / density(k).powi(2)).collect();
         let count: Vec<f64> = all.clone().map(|k| self.count(k, params.texels_per_metre)).collect();
         let total: f64 = lost.iter().sum();
         let wanting = |k: usize| (lost[k] / count[k]).powf(1.0 / (2.0 + GAIN));
@@ -154,8 +172,13 @@ impl Charts {
             let middle = f64::sqrt(low * high);
             if left(middle) > goal * total { low = middle } else { high = middle }
         }
-        let texels: f64 = all.clone().map(|k| count[k] * finer(high, k).powi(2)).sum();
+        let (mut texels, mut rough) = (0.0, 0.0);
+        for k in all.clone() {
+            let f = finer(high, k);
+            texels += count[k] * f * f;
+            rough += if f > 1.0 { detail.share[k] * count[k] * f * f } else { 0.0 };
+        }
         let reached = left(high) <= goal * total;
-        reached.then(|| (all.map(|k| self.finer[k] * finer(high, k)).collect(), texels))
+        reached.then(|| Allotment { finer: all.map(|k| self.finer[k] * finer(high, k)).collect(), texels, rough })
     }
 }

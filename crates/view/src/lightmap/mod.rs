@@ -23,7 +23,7 @@ mod pack;
 mod seams;
 mod texels;
 
-pub use allot::{Detail, GAIN, LOST};
+pub use allot::{Allotment, Detail, GAIN, LOST};
 pub use edges::{SharedEdge, shared_edges};
 pub use fill::{fill, look_up};
 pub use flatten::Charts;
