@@ -3,16 +3,16 @@
 //! Objects, instances and separate primitives that touch are sewn together by position, so that neither rays nor
 //! interpolated light find a crack between them. A vertex that lies on a neighbour's edge (a T-vertex; Baum, Mann,
 //! Smith and Winget 1991, "Making radiosity usable", §4) splits that neighbour. Only edges without a partner are
-//! examined: the closed box that stands on a floor does not cut the floor. A wall without thickness does ([`feet`]).
+//! examined, and where a wall stands on or goes through a floor that would carry light past it ([`contacts`]).
 
 mod boxes;
+mod contacts;
 mod cut;
 mod edges;
-mod feet;
 
 use crate::{Scene, Surface};
+use contacts::Contacts;
 use edges::{is_balanced, ordered, sides_of_edges};
-use feet::Feet;
 use glam::{DVec2, DVec3};
 use rustc_hash::FxHashMap;
 
@@ -84,8 +84,8 @@ impl Mesh {
                 mesh.dropped.push(index as u32);
             }
         }
-        let feet = mesh.cut_along_feet(scene, &mut weld);
-        mesh.conform(&feet);
+        let contacts = mesh.cut_along_contacts(scene, &mut weld);
+        mesh.conform(&contacts);
         mesh.smoothen(scene);
         mesh
     }
@@ -156,8 +156,8 @@ impl Mesh {
     }
 
     /// Splits every triangle at the T-vertices on its edges.
-    fn conform(&mut self, feet: &Feet) {
-        let hanging = self.hanging_vertices(feet);
+    fn conform(&mut self, contacts: &Contacts) {
+        let hanging = self.hanging_vertices(contacts);
         if hanging.is_empty() {
             return;
         }
@@ -203,12 +203,12 @@ impl Mesh {
 
     /// For every edge without a partner, the vertices of other such edges that lie on it; where surfaces stand on
     /// others, for the edges there and the vertices there too.
-    fn hanging_vertices(&self, feet: &Feet) -> FxHashMap<(u32, u32), Vec<u32>> {
+    fn hanging_vertices(&self, contacts: &Contacts) -> FxHashMap<(u32, u32), Vec<u32>> {
         // A surface's inner edges are walked once each way.
         let sides = sides_of_edges(&self.triangles, self.vertices.len());
         let unbalanced = sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| !is_balanced(faces));
         let mut loose: Vec<(u32, u32)> = unbalanced.map(|faces| faces[0].edge).collect();
-        loose.extend(feet.edges.iter().filter(|edge| sides.binary_search_by_key(edge, |side| &side.edge).is_ok()));
+        loose.extend(contacts.edges.iter().filter(|edge| sides.binary_search_by_key(edge, |side| &side.edge).is_ok()));
         loose.sort_unstable();
         loose.dedup();
         if loose.is_empty() {
@@ -220,7 +220,8 @@ impl Mesh {
         let mean = loose.iter().map(length).sum::<f64>() / loose.len() as f64;
         let cell = mean.max(8.0 * self.tolerance);
         let key = |p: DVec3| (p / cell).floor().as_i64vec3().to_array();
-        let mut ends: Vec<u32> = loose.iter().flat_map(|&(a, b)| [a, b]).chain(feet.vertices.iter().copied()).collect();
+        let mut ends: Vec<u32> =
+            loose.iter().flat_map(|&(a, b)| [a, b]).chain(contacts.vertices.iter().copied()).collect();
         ends.sort_unstable();
         ends.dedup();
         let mut grid: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
@@ -507,7 +508,7 @@ mod tests {
         assert_eq!(mesh.triangles.len(), 10 + 3);
         let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
         assert!((area - 4.0).abs() < 1e-12, "{area}");
-        assert!(mesh.hanging_vertices(&Feet::default()).is_empty());
+        assert!(mesh.hanging_vertices(&Contacts::default()).is_empty());
         // Points keep their place on the source triangle.
         for t in 0..mesh.triangles.len() {
             let uv = DVec2::new(0.3, 0.2);
@@ -518,8 +519,9 @@ mod tests {
         }
     }
 
+    /// Of each half of the floor what is lit hangs together around the corner of the box.
     #[test]
-    fn a_box_on_the_floor_does_not_cut_it() {
+    fn a_box_across_the_diagonal_of_the_floor_does_not_cut_it() {
         let mut scene = Scene::default();
         quad(&mut scene, [[0., 0., 0.], [4., 0., 0.], [4., 4., 0.], [0., 4., 0.]]);
         let p = |x: f64, y: f64, z: f64| [x, y, z];

@@ -14,6 +14,8 @@ const BITS: u32 = 16;
 /// A tree of boxes over the triangles of a mesh.
 pub(super) struct Boxes {
     order: Vec<u32>,
+    /// Low and high corners of the triangles, in this order.
+    bounds: Vec<[DVec3; 2]>,
     /// Low and high corners, from the smallest boxes to a single one.
     levels: Vec<Vec<[DVec3; 2]>>,
 }
@@ -45,46 +47,50 @@ impl Boxes {
             .collect();
         keys.sort_unstable();
         let order: Vec<u32> = keys.into_iter().map(|(_, t)| t).collect();
+        let bounds: Vec<[DVec3; 2]> = order.iter().map(|&t| bounds(t)).collect();
         let mut levels: Vec<Vec<[DVec3; 2]>> =
-            vec![order.chunks(WIDTH).map(|list| list.iter().map(|&t| bounds(t)).fold(nothing, union)).collect()];
+            vec![bounds.chunks(WIDTH).map(|list| list.iter().copied().fold(nothing, union)).collect()];
         while let Some(last) = levels.last().filter(|last| last.len() > 1) {
             let next = last.chunks(WIDTH).map(|list| list.iter().copied().fold(nothing, union)).collect();
             levels.push(next);
         }
-        Boxes { order, levels }
+        Boxes { order, bounds, levels }
     }
 
-    /// Calls `visit` with every triangle that may lie within `margin` of the line from a to b, and others near it, and
-    /// returns the number of boxes looked at.
-    pub(super) fn near(&self, [a, b]: [DVec3; 2], margin: f64, mut visit: impl FnMut(u32)) -> u64 {
-        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-        let reach = half.abs() + DVec3::splat(margin);
-        let meets = |[low, high]: &[DVec3; 2]| {
-            let (size, from) = (0.5 * (*high - *low), middle - 0.5 * (*high + *low));
-            if from.abs().cmpgt(size + reach).any() {
-                return false;
-            }
-            // The axes across the line and one of the box's: Gottschalk, Lin and Manocha 1996.
-            let size = size + DVec3::splat(margin);
-            let (cross, h) = (half.cross(from).abs(), half.abs());
-            let radius =
-                DVec3::new(size.y * h.z + size.z * h.y, size.x * h.z + size.z * h.x, size.x * h.y + size.y * h.x);
-            cross.cmple(radius).all()
-        };
-        let mut looked = 0;
-        let mut stack: Vec<(usize, usize)> = self.levels.len().checked_sub(1).map(|top| (top, 0)).into_iter().collect();
-        while let Some((level, index)) = stack.pop() {
-            looked += 1;
-            if !self.levels[level].get(index).is_some_and(meets) {
-                continue;
-            }
-            let children = index * WIDTH..(index + 1) * WIDTH;
-            if level > 0 {
-                stack.extend(children.map(|child| (level - 1, child)));
-            } else {
-                self.order[children.start..children.end.min(self.order.len())].iter().for_each(|&t| visit(t));
+    /// Calls `visit` with every two triangles whose boxes come within `margin` of each other, until that says no or `most`
+    /// comparisons are made.
+    pub(super) fn pairs(&self, margin: f64, most: u64, mut visit: impl FnMut(u32, u32) -> bool) {
+        let margin = DVec3::splat(margin);
+        let meet = |a: &[DVec3; 2], b: &[DVec3; 2]| a[0].cmple(b[1] + margin).all() && b[0].cmple(a[1] + margin).all();
+        let leaf = |index: usize| index * WIDTH..((index + 1) * WIDTH).min(self.order.len());
+        let mut compared = 0;
+        let mut stack = Vec::new();
+        for home in 0..self.levels[0].len() {
+            stack.push((self.levels.len() - 1, 0));
+            while let Some((level, index)) = stack.pop() {
+                compared += 1;
+                if compared > most {
+                    return;
+                }
+                // Each two leaves meet once, from the first of them.
+                let end = (index + 1) << (WIDTH.trailing_zeros() as usize * level);
+                let here = self.levels[level].get(index);
+                if end <= home || !here.is_some_and(|there| meet(&self.levels[0][home], there)) {
+                    continue;
+                }
+                if level > 0 {
+                    stack.extend((index * WIDTH..(index + 1) * WIDTH).map(|child| (level - 1, child)));
+                    continue;
+                }
+                for i in leaf(home).filter(|i| meet(&self.bounds[*i], &self.levels[0][index])) {
+                    for j in leaf(index).filter(|j| index > home || *j > i) {
+                        compared += 1;
+                        if meet(&self.bounds[i], &self.bounds[j]) && !visit(self.order[i], self.order[j]) {
+                            return;
+                        }
+                    }
+                }
             }
         }
-        looked
     }
 }

@@ -11,6 +11,10 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 /// thousand that all cross. Triangles beyond it stay whole.
 const MOST_PAIRS: u64 = 1 << 26;
 
+/// Vertices where lines cross, in all; each brings two triangles or so. A real scene of a million triangles has fewer.
+/// Triangles beyond it stay whole.
+const MOST_CROSSINGS: usize = 1 << 20;
+
 type Edge = (u32, u32);
 
 /// Cuts triangles; two that share an edge get the same vertices on it.
@@ -31,6 +35,11 @@ struct Line {
 impl<'a> Cutter<'a> {
     pub(super) fn new(vertices: &'a mut Vec<DVec3>, weld: &'a mut Weld) -> Cutter<'a> {
         Cutter { vertices, weld, crossings: FxHashMap::default(), pairs: 0 }
+    }
+
+    /// The vertex at a place.
+    pub(super) fn vertex(&mut self, place: DVec3) -> u32 {
+        self.weld.vertex(self.vertices, place)
     }
 
     /// The pieces of a triangle along lines that lie on it, and in `met` the vertices on these; `None` where no line
@@ -96,7 +105,7 @@ impl<'a> Cutter<'a> {
             let high = lines[i].ends[0].x.max(lines[i].ends[1].x) + 2.0 * near;
             for &j in order[n + 1..].iter().take_while(|&&j| low[j] <= high) {
                 self.pairs += 1;
-                if self.pairs > MOST_PAIRS {
+                if self.pairs > MOST_PAIRS || self.crossings.len() > MOST_CROSSINGS {
                     return false;
                 }
                 if i.max(j) < 3 {
