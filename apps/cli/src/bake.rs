@@ -10,7 +10,7 @@ use crate::{Failure, Global, numbers};
 use clap::{Args, ValueEnum};
 use radiosity::io::gltf_out::{Encoding, Style, lit_glb};
 use radiosity::io::image_out::encode_exr;
-use radiosity::{RenderOptions, Tracer, View, counted};
+use radiosity::{Camera, RenderOptions, Tracer, View, counted};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
@@ -79,17 +79,21 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let wants_view = is_exposed || arguments.image.is_some();
     let is_exposed = is_exposed || arguments.image.as_deref().is_some_and(|path| !views::is_exr(path));
     arguments.picture.warn_of_what_has_no_effect(wants_view, is_exposed, progress);
-    let camera = views::camera(&input.scene, &tracer, &arguments.picture)?;
+    // A camera that is not there is a fault even where none is needed.
+    let needs_camera = wants_view || arguments.picture.camera.is_some() || arguments.picture.eye.is_some();
+    let camera = needs_camera.then(|| views::camera(&input.scene, &tracer, &arguments.picture)).transpose()?;
 
     progress.parts();
     let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
 
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");
-    let (width, height) = views::picture_size(&camera, arguments.picture.size);
-    let options = RenderOptions { width, height, ..RenderOptions::default() };
-    let look = || radiosity::render(&baked.solution, &baked.field, &camera, &options, progress);
-    let view = wants_view.then(look).transpose()?;
+    let look = |camera: &Camera| {
+        let (width, height) = views::picture_size(camera, arguments.picture.size);
+        let options = RenderOptions { width, height, ..RenderOptions::default() };
+        radiosity::render(&baked.solution, &baked.field, camera, &options, progress)
+    };
+    let view = camera.as_ref().filter(|_| wants_view).map(look).transpose()?;
     let exposure = arguments.picture.exposure.or(view.as_ref().map(|v| v.picture.exposure())).unwrap_or(0.0);
     let mut written: Vec<&Path> = Vec::new();
     if let (Some(path), Some(view)) = (&arguments.image, &view) {
@@ -132,7 +136,9 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     for path in &arguments.report {
         let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,
-            false => html::page(&report, &plates(view.as_ref(), &camera.name, &report, exposure)?),
+            false => {
+                html::page(&report, &plates(view.as_ref(), camera.as_ref().map_or("", |c| &c.name), &report, exposure)?)
+            }
         };
         outputs.stage(path, text.as_bytes())?;
     }

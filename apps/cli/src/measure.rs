@@ -52,7 +52,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let measured = radiosity::measure(&tracer, &places, &arguments.solve.measure(), progress)?;
 
     // A file that was measured before gets its answer anew, not twice.
-    let kept: Vec<usize> = (0..read.names.len()).filter(|&i| !ANSWER.contains(&read.names[i].as_str())).collect();
+    let kept: Vec<usize> =
+        (0..read.names.len()).filter(|&i| !ANSWER.contains(&read.names[i].to_ascii_lowercase().as_str())).collect();
     let further = |cells: &[String]| kept.iter().map(|&i| format!(",{}", cell(&cells[i]))).collect::<String>();
     let mut text = format!("x,y,z,nx,ny,nz,{}{}", ANSWER.join(","), further(&read.names));
     for ((point, cells), e) in points.iter().zip(&read.cells).zip(&measured.irradiance) {

@@ -438,13 +438,20 @@ fn a_picture_is_the_same_by_render_and_by_bake() {
 #[test]
 fn the_eye_is_put_where_it_is_asked() {
     let room = Room::new("eye");
-    // The room's own camera, in its own words, and one that looks at the lamp.
-    let front = ["--eye", "0.278,0.273,-0.8", "--target", "0.278,0.273,0"];
-    for (name, view) in [("a.exr", &["--camera", "front"][..]), ("b.exr", &[&front[..], &["--fov", "37.86"]].concat())]
-    {
-        assert_eq!(room.run(["render", "-o", name].iter().chain(&COARSE).chain(view)).code, Some(0));
-    }
-    assert!(room.read("a.exr") != room.read("b.exr"), "another angle of view is another picture");
+    // The room's own camera in other words, with another angle of view, and from where it looks to.
+    let fov = (2.0 * (0.0125f64 / 0.035).atan()).to_degrees().to_string();
+    let (eye, target) = ("0.278,0.273,-0.8", "0.278,0.273,0");
+    let views: [&[&str]; 4] = [
+        &["--camera", "front"],
+        &["--eye", eye, "--target", target, "--fov", &fov],
+        &["--eye", eye, "--target", target, "--fov", "30"],
+        &["--eye", target, "--target", eye, "--fov", &fov],
+    ];
+    let pictures = views.map(|view| {
+        assert_eq!(room.run(["render", "-o", "a.png"].iter().chain(&COARSE).chain(view)).code, Some(0));
+        room.read("a.png")
+    });
+    assert!(pictures[1] == pictures[0] && pictures[2] != pictures[0] && pictures[3] != pictures[0]);
 }
 
 #[test]

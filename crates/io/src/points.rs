@@ -49,8 +49,10 @@ pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Points, LoadError> {
     let Some((at, header)) = lines.next() else {
         return Err(LoadError::one(file, "the file is empty", "the first line names x,y,z,nx,ny,nz"));
     };
-    // Spreadsheets write semicolons where the comma is the decimal sign, and tabs when copied.
-    let separator = [';', '\t'].into_iter().find(|&s| header.contains(s)).unwrap_or(',');
+    // Spreadsheets write semicolons where the comma is the decimal sign, and tabs when copied; of two that divide the header
+    // as often, the last counts.
+    let by = |separator: &char| split(header, *separator).len();
+    let separator = [';', '\t', ','].into_iter().max_by_key(by).unwrap_or(',');
     let header = split(header, separator);
     let names: Vec<String> = header.iter().map(|name| name.to_ascii_lowercase()).collect();
     let wanted = ["x", "y", "z", "nx", "ny", "nz"];
@@ -93,14 +95,19 @@ pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Points, LoadError> {
 
 /// The cells of a line, without spaces and quotes around them. Between quotes a separator is text, and two quotes are one.
 fn split(line: &str, separator: char) -> Vec<String> {
-    let mut is_quoted = false;
+    // A quote counts in cells that begin with one; in others it is text, as inches are.
+    let (mut is_quoted, mut in_quotes, mut is_start) = (false, false, true);
     let parts = line.split(|c: char| {
-        is_quoted ^= c == '"';
-        c == separator && !is_quoted
+        in_quotes |= is_start && c == '"';
+        is_quoted ^= in_quotes && c == '"';
+        let ends = c == separator && !is_quoted;
+        in_quotes &= !ends;
+        is_start = ends || (is_start && c.is_whitespace());
+        ends
     });
     let cell = |text: &str| match text.trim().strip_prefix('"').and_then(|text| text.strip_suffix('"')) {
         Some(inner) => inner.replace("\"\"", "\"").trim().to_owned(),
-        None => text.trim().trim_matches('"').trim().to_owned(),
+        None => text.trim().to_owned(),
     };
     parts.map(cell).collect()
 }
@@ -150,6 +157,11 @@ mod tests {
         assert_eq!(points[1].normal, DVec3::Z);
         let german = parse_points_csv("p", b"x;y;z;nx;ny;nz\n1,5;0;0;0;1;0\n").unwrap();
         assert_eq!(german.points[0].position.x, 1.5);
+        let inches = parse_points_csv("t", b"x,y,z,nx,ny,nz,a,\"b; c\"\n0,0,0,0,1,0,3\" pipe,foo\n").unwrap();
+        assert_eq!(
+            (inches.names, &inches.cells[0]),
+            (vec!["a".into(), "b; c".into()], &vec!["3\" pipe".into(), "foo".into()])
+        );
         let quoted =
             parse_points_csv("p", b"x,y,z,nx,ny,nz,\"the, place\",\n1,0,0,0,1,0,\"a \"\"b\"\", c\"\n").unwrap();
         assert_eq!(

@@ -21,6 +21,9 @@ const EDGE_CONTRAST: f64 = 0.1;
 /// How many points: stairs of 1/16 are below what a display shows.
 const EDGE_POINTS: u32 = 16;
 
+/// Points that are lit at a time.
+const PORTION: usize = 1 << 18;
+
 /// How often an edge is followed on to further texels.
 const EDGE_ROUNDS: usize = 4;
 
@@ -113,7 +116,10 @@ impl<'b, 'a> Canvas<'b, 'a> {
                 if more.is_empty() {
                     break;
                 }
-                values.extend(self.light(&more, EDGE_POINTS, judge, monitor)?);
+                // In portions, as they may be many times as many as the texels.
+                for some in more.chunks(PORTION) {
+                    values.extend(self.light(some, EDGE_POINTS, judge, monitor)?);
+                }
                 points.extend(more);
             }
             let picture = fill(*size, &points, &values);

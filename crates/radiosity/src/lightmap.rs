@@ -112,8 +112,8 @@ pub fn lightmap(
         let detail = canvas.detail(&drawn, tolerance);
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
         let whole = allot(goal.left);
-        needed = Some(whole.as_ref().map_or(f64::INFINITY, |whole| whole.texels));
-        // What cannot be reached is not begun.
+        needed = whole.as_ref().map(|whole| whole.texels);
+        // A map that cannot reach it is not begun.
         if whole.is_none_or(|whole| whole.texels > most.min(MOST_TEXELS)) {
             break;
         }

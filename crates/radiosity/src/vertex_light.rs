@@ -73,33 +73,39 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
     Ok(VertexLight { primitives: lattice.primitives, audit, rounds })
 }
 
-/// Divisions with which a part `goal` is left of what is `lost` by face; nothing where that takes more than `most` vertices.
-/// Always the face is doubled that gains most for its vertices.
+/// Divisions with which a part `goal` is left of what is `lost` by face; nothing where that takes more than `most` vertices,
+/// or where nothing is known to be lost. Always the triangle is doubled that gains most for its vertices, on all sides lit.
 fn finer(faces: &[Face], lost: &[f64], division: &[u32], goal: f64, most: f64) -> Option<Vec<u32>> {
     let mut division = division.to_vec();
     let total: f64 = lost.iter().sum();
     let vertices = |k: u32| 0.5 * f64::from(k) * f64::from(k);
-    let mut count: f64 = faces.iter().map(|f| vertices(division[f.triangle])).sum();
+    let (mut own, mut sides) = (vec![0.0; division.len()], vec![0.0; division.len()]);
+    for (face, lost) in faces.iter().zip(lost) {
+        own[face.triangle] += lost;
+        sides[face.triangle] += 1.0;
+    }
+    let mut count: f64 = division.iter().zip(&sides).map(|(k, sides)| sides * vertices(*k)).sum();
     let mut left = total;
     // Non-negative floats are ordered as their bits are.
     let merit = |lost: f64, k: u32| (lost / vertices(k)).to_bits();
-    let mut heap: BinaryHeap<(u64, Reverse<usize>)> = BinaryHeap::new();
-    let mut own = lost.to_vec();
-    for (index, face) in faces.iter().enumerate().filter(|(index, _)| lost[*index] > 0.0) {
-        heap.push((merit(own[index], division[face.triangle]), Reverse(index)));
+    let rough = (0..division.len()).filter(|t| own[*t] > 0.0);
+    let mut heap: BinaryHeap<(u64, Reverse<usize>)> =
+        rough.map(|t| (merit(own[t] / sides[t], division[t]), Reverse(t))).collect();
+    if total <= 0.0 {
+        return None;
     }
     while left > goal * total {
-        let (_, Reverse(index)) = heap.pop()?;
-        let k = &mut division[faces[index].triangle];
-        let gain = own[index] * (1.0 - 2f64.powf(-GAIN));
-        count += 3.0 * vertices(*k);
+        let (_, Reverse(triangle)) = heap.pop()?;
+        let k = &mut division[triangle];
+        let gain = own[triangle] * (1.0 - 2f64.powf(-GAIN));
+        count += 3.0 * sides[triangle] * vertices(*k);
         if count > most || *k >= FINEST {
             return None;
         }
         *k *= 2;
-        own[index] -= gain;
+        own[triangle] -= gain;
         left -= gain;
-        heap.push((merit(own[index], *k), Reverse(index)));
+        heap.push((merit(own[triangle] / sides[triangle], *k), Reverse(triangle)));
     }
     Some(division)
 }

@@ -5,7 +5,10 @@
 //! by how much light the first ones, and those of receivers nearby, brought from each cell and the cells around it. Some
 //! go everywhere all the same, and each weighs the inverse of its density, so the mean is right whatever the first rays
 //! missed (importance sampling by a pilot; Kahn and Marshall 1953). Where light comes from all around, the first rays
-//! are good enough and count themselves.
+//! count themselves; with new ones as well as long as there are too few to be sure of it.
+//!
+//! Rays that agree are believed, which is biased: of a speck of the hemisphere p that N rays, the neighbours' included,
+//! miss with probability (1 − p)^N, that part is lost: of a sky of 10,000 lx less than 8 lx at N = 512, 1 lx at 4,096.
 
 use crate::one_light::luminance_of;
 use crate::receivers::Site;
@@ -28,8 +31,7 @@ const EVEN: f64 = 0.25;
 /// their own standard error.
 const OPEN: f64 = 0.1;
 
-/// So many rays, those of neighbours included, are trusted to have missed nothing that matters: a window that sends less
-/// than one of them is a speck.
+/// So many rays, those of neighbours included, are trusted to have missed nothing that matters.
 const TRUSTED: u32 = 512;
 
 /// The stream of sample points that the new rays use.
@@ -89,8 +91,9 @@ impl Pilot {
         self.light[(k * self.side + j) * self.side + i] += light as f32;
     }
 
-    /// The mean light over the hemisphere of receiver k, by the two halves of its rays, or by those of new ones: these take the points of a sequence from a given one on, no more than there were rays. `arriving` is asked for
-    /// the light of point (u, v, x, y), u and v drawn by the density.
+    /// The mean light over the hemisphere of receiver k, by the two halves of its rays, those of new ones, or both. New ones
+    /// take the points of a sequence from a given one on, as many as there were rays. `arriving` is asked for the light of
+    /// point (u, v, x, y), u and v drawn by the density.
     pub fn mean(
         &mut self,
         k: usize,
@@ -105,12 +108,14 @@ impl Pilot {
         for other in self.neighbours(k).map(|other| self.receivers[other]) {
             (rays, sum, square) = (rays + other.rays, sum + other.sum, square + other.square);
         }
-        if rays >= TRUSTED && sum * sum >= OPEN * f64::from(rays) * square {
-            return own.halves.map(|sum| sum.map(|s| (2.0 * s / f64::from(own.rays)) as f32));
+        let is_even = sum > 0.0 && sum * sum >= OPEN * f64::from(rays) * square;
+        let first = own.halves.map(|sum| sum.map(|s| 2.0 * s / f64::from(own.rays)));
+        if rays >= TRUSTED && (is_even || sum <= 0.0) {
+            return first.map(|half| half.map(|e| e as f32));
         }
         let half_rays = own.rays / 2;
         self.make_density(k);
-        [0, 1].map(|half| {
+        [0u32, 1].map(|half| {
             let mut sum = [0f64; 3];
             for index in (0..half_rays).map(|i| from + half * half_rays + i) {
                 let [u, v, x, y] = sequence.point(index);
@@ -118,7 +123,10 @@ impl Pilot {
                 let light = arriving(index, [u, v, x, y]);
                 (0..3).for_each(|band| sum[band] += light[band] / density);
             }
-            sum.map(|s| (s / f64::from(half_rays)) as f32)
+            // The first rays of a light that is even tell as much as these.
+            let again = sum.map(|s| s / f64::from(half_rays));
+            let part = if is_even { 0.5 } else { 0.0 };
+            std::array::from_fn(|band| (part * first[half as usize][band] + (1.0 - part) * again[band]) as f32)
         })
     }
 

@@ -153,7 +153,7 @@ impl Lists {
         if !lists.colors.is_empty() {
             lists.colors.resize(lists.positions.len(), [1.0; 4]);
         }
-        unreadable.warn(file, "hold something else than numbers; what uses them is dropped", faults);
+        unreadable.warn(file, "with something else than numbers; what uses them is dropped", faults);
         lists
     }
 }

@@ -65,17 +65,18 @@ impl Boxes {
         let leaf = |index: usize| index * WIDTH..((index + 1) * WIDTH).min(self.order.len());
         let mut compared = 0;
         let mut stack = Vec::new();
-        for home in 0..self.levels[0].len() {
+        // From the largest triangles down, so that what is not reached is clutter.
+        for home in (0..self.levels[0].len()).rev() {
             stack.push((self.levels.len() - 1, 0));
             while let Some((level, index)) = stack.pop() {
                 compared += 1;
                 if compared > most {
                     return;
                 }
-                // Each two leaves meet once, from the first of them.
-                let end = (index + 1) << (WIDTH.trailing_zeros() as usize * level);
+                // Each two leaves meet once, from the last of them.
+                let start = index << (WIDTH.trailing_zeros() as usize * level);
                 let here = self.levels[level].get(index);
-                if end <= home || !here.is_some_and(|there| meet(&self.levels[0][home], there)) {
+                if start > home || !here.is_some_and(|there| meet(&self.levels[0][home], there)) {
                     continue;
                 }
                 if level > 0 {
@@ -83,7 +84,7 @@ impl Boxes {
                     continue;
                 }
                 for i in leaf(home).filter(|i| meet(&self.bounds[*i], &self.levels[0][index])) {
-                    for j in leaf(index).filter(|j| index > home || *j > i) {
+                    for j in leaf(index).filter(|j| index < home || *j > i) {
                         compared += 1;
                         if meet(&self.bounds[i], &self.bounds[j]) && !visit(self.order[i], self.order[j]) {
                             return;

@@ -181,7 +181,8 @@ fn cross([a, b]: [DVec2; 2], [p, q]: [DVec2; 2]) -> Option<(f64, f64)> {
     (between(s) && between(t)).then_some((s, t))
 }
 
-/// The triangles within a closed border, along lines where these do not cross. `None` where the border crosses itself.
+/// The triangles within a closed border, along lines where these do not cross. Where the border crosses itself they do not
+/// add up to its area.
 fn triangulate(border: &[Edge], lines: &[Edge], place: impl Fn(u32) -> DVec2) -> Option<Vec<[u32; 3]>> {
     let mut triangles = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
     let mut handles = FxHashMap::default();
@@ -189,7 +190,7 @@ fn triangulate(border: &[Edge], lines: &[Edge], place: impl Fn(u32) -> DVec2) ->
     for v in border.iter().chain(lines).flat_map(|&(p, q)| [p, q]) {
         if let std::collections::hash_map::Entry::Vacant(entry) = handles.entry(v) {
             // Numbers next to nothing are refused.
-            let [x, y] = place(v).to_array().map(|x| if x.abs() < 1e-100 { 0.0 } else { x });
+            let [x, y] = place(v).to_array().map(|x| if x.abs() < 1e-42 { 0.0 } else { x });
             let handle = triangles.insert(Point2::new(x, y)).ok()?;
             entry.insert(handle);
             if handle.index() == names.len() {
