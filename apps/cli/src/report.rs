@@ -244,12 +244,14 @@ impl Report {
         let solution = &baked.solution;
         let finer = match &lightmap {
             Some(map) => {
-                let needed = map.needed.map_or(String::new(), |texels| format!(" and would need about {texels:.0}"));
+                let needed = map
+                    .needed
+                    .map_or(String::new(), |texels| format!(", and what was asked would take some {texels:.0}"));
                 let finest = if map.finest > map.density { format!(" to {:.1}", map.finest) } else { String::new() };
                 let (texels, density, twice) = (map.texels, map.density, (2.0 * map.density).ceil());
                 format!(
-                    "the lightmap has {texels} texels{needed}, {density:.1}{finest} per metre, try \
-                     --texels-per-metre {twice:.0}"
+                    "the lightmap has {texels} texels, {density:.1}{finest} per metre{needed}; \
+                     --texels-per-metre {twice:.0} comes nearer"
                 )
             }
             None => format!(

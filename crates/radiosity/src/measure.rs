@@ -207,8 +207,12 @@ pub(crate) fn most_paths(error: f64) -> u32 {
     rays_for(error, 4096.0, 64, 1 << 16) as u32
 }
 
-/// Has the auditor `judge` an answer, spending the referee's paths while the target lies between the two bounds: taking an estimate for
-/// the truth would refine for the noise of the referee.
+/// Paths of the referee, over all places, before a miss is believed: a few thousand, and what one bright path in them
+/// says of a few places may be wrong by more than its own scatter tells.
+const SURE: u32 = 1 << 16;
+
+/// Has the auditor `judge` an answer, spending the referee's paths while the target lies between the two bounds, or above
+/// them too early: taking an estimate for the truth would refine for the noise of the referee.
 pub(crate) fn certify(
     auditor: &mut Auditor,
     judge: impl Fn(&Auditor) -> Audit,
@@ -222,9 +226,11 @@ pub(crate) fn certify(
         if auditor.paths() == 0 && !auditor.trace(64, |done| monitor.step(done, total)) {
             return Err(Error::Stopped);
         }
+        let least = SURE.div_ceil(total.max(1) as u32);
         loop {
             let audit = judge(auditor);
-            let open = audit.lower <= target && target < audit.upper && 2 * auditor.paths() <= most_paths;
+            let unsure = audit.lower <= target || auditor.paths() < least;
+            let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths;
             if !open {
                 return Ok(audit);
             }

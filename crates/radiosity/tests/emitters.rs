@@ -93,7 +93,8 @@ fn the_balance_closes_with_blended_surfaces() {
 fn lamps_with_pictures_are_counted_once() {
     const SIZE: u32 = 1024;
     const ELEMENT: f64 = 0.4;
-    let picture = TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap: [Wrap::Clamp; 2] };
+    let picture =
+        TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap: [Wrap::Clamp; 2], nearest: false };
     let lamp = Material { emissive_texture: Some(picture), ..black(1000.0) };
     let texels = vec![[255; 4]; (SIZE * SIZE) as usize];
     let bright = Texture { name: String::new(), width: SIZE, height: SIZE, texels };

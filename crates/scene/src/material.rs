@@ -18,6 +18,8 @@ pub struct TextureRef {
     pub transform: DAffine2,
     /// Behaviour outside 0..1 along u and v.
     pub wrap: [Wrap; 2],
+    /// Whether texels are squares of one colour (magnification by NEAREST), not blended into each other.
+    pub nearest: bool,
 }
 
 impl TextureRef {

@@ -250,7 +250,7 @@ impl Scene {
                 uv += weight * set[vertex as usize].as_dvec2();
             }
         }
-        self.textures[texture.texture].sample(texture.coordinates(uv), texture.wrap, srgb)
+        self.textures[texture.texture].sample(texture.coordinates(uv), texture.wrap, texture.nearest, srgb)
     }
 
     /// Checks what every later stage takes for granted, naming each fault: finite positions, indices in range,

@@ -56,12 +56,14 @@ impl Texture {
         self.texels.iter().all(|t| t[3] == 255)
     }
 
-    /// Bilinear look-up at `uv`. Colour is decoded from sRGB when `srgb`; alpha never is. All in 0..1.
-    pub fn sample(&self, uv: DVec2, wrap: [Wrap; 2], srgb: bool) -> [f32; 4] {
+    /// Look-up at `uv`, bilinear or of the `nearest` texel. Colour is decoded from sRGB when `srgb`; alpha never is. All in
+    /// 0..1.
+    pub fn sample(&self, uv: DVec2, wrap: [Wrap; 2], nearest: bool, srgb: bool) -> [f32; 4] {
         let (w, h) = (i64::from(self.width), i64::from(self.height));
         // After the product, which may overflow where `uv` does not.
         let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
-        let (x, y) = (finite(uv.x * w as f64) - 0.5, finite(uv.y * h as f64) - 0.5);
+        let (x, y) = (finite(uv.x * w as f64), finite(uv.y * h as f64));
+        let [x, y] = if nearest { [x.floor(), y.floor()] } else { [x - 0.5, y - 0.5] };
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
         let mut sum = [0.0; 4];
@@ -88,13 +90,23 @@ impl Texture {
 mod tests {
     use super::*;
 
+    /// A chequer of two texels has two colours where texels are squares, and all between them where they are blended.
+    #[test]
+    fn nearest_texels_are_squares() {
+        let texels = vec![[0; 4], [255; 4]];
+        let texture = Texture { name: "t".to_owned(), width: 2, height: 1, texels };
+        let at = |u: f64, nearest: bool| texture.sample(DVec2::new(u, 0.5), [Wrap::Repeat; 2], nearest, false)[0];
+        assert_eq!([0.0, 0.49, 0.51, 0.99, 1.1, -0.1].map(|u| at(u, true)), [0.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
+        assert!((at(0.5, false) - 0.5).abs() < 1e-6);
+    }
+
     /// KHR_texture_transform may move by 1e308: 64 times that is infinite, and its fraction was no number.
     #[test]
     fn coordinates_that_overflow_have_a_colour() {
         let texture = Texture { name: "t".to_owned(), width: 64, height: 64, texels: vec![[128; 4]; 64 * 64] };
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             for u in [1e308, -1e308, 1e300, f64::MAX, f64::NAN, f64::INFINITY] {
-                let [r, ..] = texture.sample(DVec2::new(u, 0.5), [wrap; 2], false);
+                let [r, ..] = texture.sample(DVec2::new(u, 0.5), [wrap; 2], false, false);
                 assert!((r - 128.0 / 255.0).abs() < 1e-6, "{r} at {u}, {wrap:?}");
             }
         }

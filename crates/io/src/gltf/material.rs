@@ -158,9 +158,11 @@ impl Pictures<'_> {
             faults.warning(place, what, "only sets 0 and 1 are read");
             return None;
         };
-        let wrap = wrap(json.get("sampler").and_then(whole).and_then(|i| list(&self.document.json, "samplers").get(i)));
+        let sampler = json.get("sampler").and_then(whole).and_then(|i| list(&self.document.json, "samplers").get(i));
+        let nearest = sampler.and_then(|s| s.get("magFilter")).and_then(whole) == Some(9728);
         let texture = self.decode(json, place, faults)?;
-        Some(TextureRef { texture, uv_set, transform: transform.map_or(DAffine2::IDENTITY, uv_transform), wrap })
+        let transform = transform.map_or(DAffine2::IDENTITY, uv_transform);
+        Some(TextureRef { texture, uv_set, transform, wrap: wrap(sampler), nearest })
     }
 
     fn decode(&mut self, texture: &Value, place: &str, faults: &mut Faults) -> Option<usize> {

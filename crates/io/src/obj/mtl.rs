@@ -168,7 +168,7 @@ impl<'a> Library<'a> {
         // v points up in OBJ and down here, so the scaling is about v = 1.
         let moved = DVec2::new(offset.x, 1.0 - scale.y - offset.y);
         let transform = DAffine2::from_mat2_translation(DMat2::from_diagonal(scale), moved);
-        Some(TextureRef { texture, uv_set: 0, transform, wrap: [wrap; 2] })
+        Some(TextureRef { texture, uv_set: 0, transform, wrap: [wrap; 2], nearest: false })
     }
 }
 
