@@ -3,7 +3,7 @@
 //! Objects, instances and separate primitives that touch are sewn together by position, so that neither rays nor
 //! interpolated light find a crack between them. A vertex that lies on a neighbour's edge (a T-vertex; Baum, Mann,
 //! Smith and Winget 1991, "Making radiosity usable", §4) splits that neighbour. Only edges without a partner are
-//! examined, and where a wall stands on or goes through a floor that would carry light past it ([`contacts`]).
+//! examined, and where a wall stands on or goes through a floor that would carry light past it (`mesh/contacts.rs`).
 
 mod boxes;
 mod contacts;
