@@ -65,6 +65,8 @@ pub struct Mesh {
     pub tolerance: f64,
     /// Scene triangles that are missing here: two of their corners were welded into one.
     pub dropped: Vec<u32>,
+    /// Whether so many surfaces go through each other that not all were cut where they do: light may pass below walls.
+    pub uncut: bool,
 }
 
 const WHOLE: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::Y];

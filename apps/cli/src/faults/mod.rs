@@ -28,6 +28,13 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
             "turn the faces that look the wrong way ('recalculate normals'), or make the material two-sided",
         );
     }
+    if mesh.uncut {
+        faults.warning(
+            title,
+            "too many surfaces go through each other for all to be cut there; light may pass below walls",
+            "join what belongs together, or remove what is inside of other things",
+        );
+    }
     let overlaps = overlap::search(scene, mesh);
     for (&object, &(count, on)) in &overlaps.objects {
         let triangles = counted(count, "triangle lies", "triangles lie");

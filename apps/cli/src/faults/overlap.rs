@@ -108,11 +108,13 @@ pub fn search(scene: &Scene, mesh: &Mesh) -> Overlaps {
 
 fn summed(scene: &Scene, mesh: &Mesh, lies_on: &[Option<usize>], covered: &[bool], more: bool) -> Overlaps {
     let mut objects: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+    let mut last = None;
     for (t, on) in lies_on.iter().enumerate() {
         if let Some(on) = on.filter(|_| !covered[t]) {
-            let (count, first) =
-                objects.entry(scene.triangle_object[mesh.source[t] as usize] as usize).or_insert((0, on));
-            *count += 1;
+            let source = mesh.source[t];
+            let (count, first) = objects.entry(scene.triangle_object[source as usize] as usize).or_insert((0, on));
+            // The pieces of a triangle follow each other, and count once.
+            *count += usize::from(last.replace(source) != Some(source));
             *first = on.min(*first);
         }
     }

@@ -1,4 +1,4 @@
-//! Which triangles come near a line: boxes around eight triangles, around eight such boxes, and so on, over the triangles
+//! Which triangles come near each other: boxes around eight triangles, around eight such boxes, and so on, over the triangles
 //! in the order of a space-filling curve, those of similar size together (Morton 1966; Lauterbach et al. 2009, "Fast BVH
 //! construction on GPUs", §3). Made in the time that sorting takes; a box of much larger triangles would surround all others.
 
@@ -58,8 +58,8 @@ impl Boxes {
     }
 
     /// Calls `visit` with every two triangles whose boxes come within `margin` of each other, until that says no or `most`
-    /// comparisons are made.
-    pub(super) fn pairs(&self, margin: f64, most: u64, mut visit: impl FnMut(u32, u32) -> bool) {
+    /// comparisons are made. Whether it came to its end.
+    pub(super) fn pairs(&self, margin: f64, most: u64, mut visit: impl FnMut(u32, u32) -> bool) -> bool {
         let margin = DVec3::splat(margin);
         let meet = |a: &[DVec3; 2], b: &[DVec3; 2]| a[0].cmple(b[1] + margin).all() && b[0].cmple(a[1] + margin).all();
         let leaf = |index: usize| index * WIDTH..((index + 1) * WIDTH).min(self.order.len());
@@ -71,7 +71,7 @@ impl Boxes {
             while let Some((level, index)) = stack.pop() {
                 compared += 1;
                 if compared > most {
-                    return;
+                    return false;
                 }
                 // Each two leaves meet once, from the last of them.
                 let start = index << (WIDTH.trailing_zeros() as usize * level);
@@ -87,11 +87,12 @@ impl Boxes {
                     for j in leaf(index).filter(|j| index < home || *j > i) {
                         compared += 1;
                         if meet(&self.bounds[i], &self.bounds[j]) && !visit(self.order[i], self.order[j]) {
-                            return;
+                            return false;
                         }
                     }
                 }
             }
         }
+        true
     }
 }

@@ -31,8 +31,9 @@ const ELEMENTS: f64 = 10_000.0;
 const MOST_JOINED: usize = 32;
 
 /// Boxes and triangles that the search for contacts compares: this many at most for each triangle of the scene, and
-/// [`LEAST_SEARCH`]. Beyond it, where large triangles lie across everything, contacts are no longer looked for. It keeps
-/// the time linear in the triangles; twice as many take twice as long in such a scene, and any other never gets there.
+/// [`LEAST_SEARCH`]. Beyond it, where large triangles lie across everything, contacts are no longer looked for
+/// ([`Mesh::uncut`]). It keeps the time linear in the triangles; twice as many take twice as long in such a scene, and any
+/// other never gets there.
 const SEARCH: u64 = 500;
 
 /// Small scenes may compare so many: of the order of a second.
@@ -70,7 +71,7 @@ impl Mesh {
     /// Cuts surfaces along their contacts.
     pub(super) fn cut_along_contacts(&mut self, scene: &Scene, weld: &mut Weld) -> Contacts {
         let area: f64 = (0..self.triangles.len()).map(|t| self.area(t)).sum();
-        let mut list = self.contacts(scene);
+        let (mut list, found_all) = self.contacts(scene);
         self.keep_long(&mut list, LEAST_RUN * (2.0 * area / ELEMENTS).sqrt());
         list.sort_by_key(|contact| contact.host);
 
@@ -104,22 +105,23 @@ impl Mesh {
             contacts.edges.extend((0..3).map(|i| ordered(corners[i], corners[(i + 1) % 3])));
             contacts.edges.extend(edges);
         }
+        self.uncut = !found_all || cutter.gave_up();
         if !pieces.is_empty() {
             self.replace(&pieces);
         }
         contacts
     }
 
-    /// The contacts of all triangles.
-    fn contacts(&self, scene: &Scene) -> Vec<Contact> {
+    /// The contacts of all triangles, and whether these are all.
+    fn contacts(&self, scene: &Scene) -> (Vec<Contact>, bool) {
         let most = (SEARCH * self.triangles.len() as u64).max(LEAST_SEARCH);
         let most_kept = (CONTACTS * self.triangles.len()).max(LEAST_CONTACTS);
         let mut list = Vec::new();
-        Boxes::new(self).pairs(self.tolerance, most, |s, t| {
+        let found_all = Boxes::new(self).pairs(self.tolerance, most, |s, t| {
             self.meet(scene, [s, t], &mut list);
             list.len() < most_kept
         });
-        list
+        (list, found_all)
     }
 
     /// Keeps the contacts that extend over a length, with those that go on from them about straight on, and edges at which
@@ -530,6 +532,18 @@ mod tests {
         let pile: Vec<_> = (0..6).flat_map(|i| solid([0., 0., f64::from(i)], [4., 3., f64::from(i + 1)])).collect();
         whole(&[&[FLOOR][..], &pile].concat());
         whole(&[solid([0., 0., 0.], [2., 2., 2.]), solid([1., 1., 1.], [3., 3., 3.])].concat());
+    }
+
+    /// A grid of sheets, each of which goes through all across it, has more contacts than are looked for; that is told.
+    #[test]
+    fn what_stays_uncut_is_told() {
+        let grid = |n: u32| {
+            let along = |i: u32| 4.0 * (f64::from(i) + 0.5) / f64::from(n);
+            let sheets = |i| [wall([along(i), 0.], [along(i), 4.]), wall([0., along(i)], [4., along(i)])];
+            Mesh::new(&scene(&(0..n).flat_map(sheets).collect::<Vec<_>>()))
+        };
+        assert!(!grid(10).uncut);
+        assert!(grid(200).uncut);
     }
 
     /// Walls at all angles and places, near each other and the floor's edges by less than is told apart, and slivers.

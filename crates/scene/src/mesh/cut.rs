@@ -37,6 +37,11 @@ impl<'a> Cutter<'a> {
         Cutter { vertices, weld, crossings: FxHashMap::default(), pairs: 0 }
     }
 
+    /// Whether triangles stayed whole because there were too many lines.
+    pub(super) fn gave_up(&self) -> bool {
+        self.pairs > MOST_PAIRS || self.crossings.len() > MOST_CROSSINGS
+    }
+
     /// The vertex at a place.
     pub(super) fn vertex(&mut self, place: DVec3) -> u32 {
         self.weld.vertex(self.vertices, place)
@@ -105,7 +110,7 @@ impl<'a> Cutter<'a> {
             let high = lines[i].ends[0].x.max(lines[i].ends[1].x) + 2.0 * near;
             for &j in order[n + 1..].iter().take_while(|&&j| low[j] <= high) {
                 self.pairs += 1;
-                if self.pairs > MOST_PAIRS || self.crossings.len() > MOST_CROSSINGS {
+                if self.gave_up() {
                     return false;
                 }
                 if i.max(j) < 3 {
