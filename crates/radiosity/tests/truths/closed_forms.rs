@@ -21,11 +21,6 @@ fn check(id: &str, scene: &Scene, error: f64, expected: &[(DVec3, DVec3, f64, f6
     }
 }
 
-/// The number that a case gives at a position, by the key of the position.
-fn at(case: &Value, results: &str, key: &str) -> f64 {
-    case["results"][results][key].as_f64().unwrap()
-}
-
 /// A disc of the true area at height `z`, facing up or down.
 fn disc(radius: f64, z: f64, up: bool) -> Vec<[DVec3; 3]> {
     let step = TAU / FACETS as f64;
@@ -54,76 +49,65 @@ fn boxes() {
     }
 }
 
+/// Checks two surfaces that face each other, `gap` apart, at points on both; `at` has their keys in the case, and where they
+/// lie for a surface of the given size.
+fn check_facing(
+    case: &Value,
+    sizes: [f64; 2],
+    surface: impl Fn(f64, f64, bool) -> Vec<[DVec3; 3]>,
+    results: &str,
+    at: &[(&str, [f64; 2])],
+) {
+    let given = |key: &str| numbers(&case["given"][key]);
+    let (exitance, rho, gap) = (given("exitance"), given("reflectance"), given("gap")[0]);
+    let mut scene = Scene { up: Up::Z, ..Scene::default() };
+    let mut expected = Vec::new();
+    for (side, normal) in [DVec3::Z, -DVec3::Z].into_iter().enumerate() {
+        let (size, z) = (sizes[side], gap * side as f64);
+        scene.materials.push(gray(exitance[side], rho[side]));
+        scene.add_triangles("surface", side, &surface(size, z, side == 0));
+        for (key, [x, y]) in at {
+            let exact = case["results"][format!("radiosity_{}{results}", side + 1)][key].as_f64().unwrap();
+            expected.push((DVec3::new(size * x, size * y, z), normal, exitance[side], rho[side], exact));
+        }
+    }
+    check(case["id"].as_str().unwrap(), &scene, 0.01, &expected);
+}
+
+/// A rectangle of corners (x, y), counter-clockwise from above, that faces up or down at height z.
+fn rectangle(corners: [[f64; 2]; 4], z: f64, up: bool) -> Vec<[DVec3; 3]> {
+    let [a, b, c, d] = corners.map(|[x, y]| DVec3::new(x, y, z));
+    if up { vec![[a, b, c], [a, c, d]] } else { vec![[a, d, c], [a, c, b]] }
+}
+
 /// Two squares that face each other: the Fredholm equation at centre, middle of an edge, and corner.
 #[test]
 fn opposed_squares() {
+    let square = |half: f64, z, up| rectangle([[-half, -half], [half, -half], [half, half], [-half, half]], z, up);
+    let at = [("centre", [0.0, 0.0]), ("edge_mid", [1.0, 0.0]), ("corner", [1.0, 1.0])];
     for id in ["rad-squares-1", "rad-squares-2"] {
-        let case = case("radiosity", id);
-        let (exitance, rho) = (numbers(&case["given"]["exitance"]), numbers(&case["given"]["reflectance"]));
-        let gap = case["given"]["gap"].as_f64().unwrap();
-        let mut scene = Scene { up: Up::Z, ..Scene::default() };
-        scene.materials = vec![gray(exitance[0], rho[0]), gray(exitance[1], rho[1])];
-        scene.add_quad("lower", 0, square_at(0.5, 0.0));
-        let [a, b, c, d] = square_at(0.5, gap);
-        scene.add_quad("upper", 1, [a, d, c, b]);
-        let mut expected = Vec::new();
-        for (side, normal) in [DVec3::Z, -DVec3::Z].into_iter().enumerate() {
-            for (key, x, y) in [("centre", 0.0, 0.0), ("edge_mid", 0.5, 0.0), ("corner", 0.5, 0.5)] {
-                let exact = at(&case, &format!("radiosity_{}", side + 1), key);
-                expected.push((DVec3::new(x, y, gap * side as f64), normal, exitance[side], rho[side], exact));
-            }
-        }
-        check(id, &scene, 0.01, &expected);
+        check_facing(&case("radiosity", id), [0.5; 2], square, "", &at);
     }
 }
 
 /// Sparrow and Cess: two coaxial discs, along their radii.
 #[test]
 fn coaxial_discs() {
+    let at = [("0", 0.0), ("0.25", 0.25), ("0.5", 0.5), ("0.75", 0.75), ("1", 1.0)].map(|(key, x)| (key, [x, 0.0]));
     for id in ["rad-coaxial-disks-1", "rad-coaxial-disks-2"] {
         let case = case("radiosity", id);
-        let given = |key: &str| numbers(&case["given"][key]);
-        let (radius, exitance, rho) = (given("radius"), given("exitance"), given("reflectance"));
-        let gap = case["given"]["gap"].as_f64().unwrap();
-        let mut scene = Scene { up: Up::Z, ..Scene::default() };
-        scene.materials = vec![gray(exitance[0], rho[0]), gray(exitance[1], rho[1])];
-        scene.add_triangles("lower", 0, &disc(radius[0], 0.0, true));
-        scene.add_triangles("upper", 1, &disc(radius[1], gap, false));
-        let mut expected = Vec::new();
-        for (side, normal) in [DVec3::Z, -DVec3::Z].into_iter().enumerate() {
-            for key in ["0", "0.25", "0.5", "0.75", "1"] {
-                let x = radius[side] * key.parse::<f64>().unwrap();
-                let exact = at(&case, &format!("radiosity_{}_at_r/R", side + 1), key);
-                expected.push((DVec3::new(x, 0.0, gap * side as f64), normal, exitance[side], rho[side], exact));
-            }
-        }
-        check(id, &scene, 0.01, &expected);
+        let radius = numbers(&case["given"]["radius"]);
+        check_facing(&case, [radius[0], radius[1]], disc, "_at_r/R", &at);
     }
 }
 
 /// Sparrow 1960: two long strips that face each other, across their width. Strips 200 wide stand for infinite ones.
 #[test]
 fn facing_strips() {
+    let strip = |w: f64, z, up| rectangle([[0.0, -100.0], [w, -100.0], [w, 100.0], [0.0, 100.0]], z, up);
+    let at = [("0", 0.0), ("0.1", 0.1), ("0.25", 0.25), ("0.5", 0.5)].map(|(key, x)| (key, [x, 0.0]));
     for id in ["rad-2d-plates-1", "rad-2d-plates-2"] {
-        let case = case("radiosity", id);
-        let (exitance, rho) = (numbers(&case["given"]["exitance"]), numbers(&case["given"]["reflectance"]));
-        let gap = case["given"]["gap"].as_f64().unwrap();
-        let mut scene = Scene { up: Up::Z, ..Scene::default() };
-        scene.materials = vec![gray(exitance[0], rho[0]), gray(exitance[1], rho[1])];
-        let corners =
-            |z: f64| [[0.0, -100.0], [1.0, -100.0], [1.0, 100.0], [0.0, 100.0]].map(|[x, y]| DVec3::new(x, y, z));
-        let [a, b, c, d] = corners(gap);
-        scene.add_quad("lower", 0, corners(0.0));
-        scene.add_quad("upper", 1, [a, d, c, b]);
-        let mut expected = Vec::new();
-        for (side, normal) in [DVec3::Z, -DVec3::Z].into_iter().enumerate() {
-            for key in ["0", "0.1", "0.25", "0.5"] {
-                let exact = at(&case, &format!("radiosity_{}_at_x/w", side + 1), key);
-                let x = key.parse().unwrap();
-                expected.push((DVec3::new(x, 0.0, gap * side as f64), normal, exitance[side], rho[side], exact));
-            }
-        }
-        check(id, &scene, 0.01, &expected);
+        check_facing(&case("radiosity", id), [1.0; 2], strip, "_at_x/w", &at);
     }
 }
 

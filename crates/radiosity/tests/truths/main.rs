@@ -11,7 +11,6 @@ use radiosity::{
 use serde_json::Value;
 use std::ops::Range;
 
-#[path = "truths/closed_forms.rs"]
 mod closed_forms;
 
 const PI: f64 = std::f64::consts::PI;
