@@ -253,7 +253,7 @@ mod tests {
     use super::*;
     use radiosity_scene::Material;
 
-    /// Of rays at the foot of a wall one in ten million met the floor behind it, and lit the dark room there.
+    /// Now and then a ray at the foot of a wall met the floor behind it, and lit the dark room there.
     #[test]
     fn rays_at_the_foot_of_a_wall_do_not_meet_what_is_behind() {
         let material = Material { double_sided: true, ..Material::default() };
