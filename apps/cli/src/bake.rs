@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let look = |camera: &Camera| {
         let (width, height) = views::picture_size(camera, arguments.picture.size);
         let options = RenderOptions { width, height, ..RenderOptions::default() };
-        radiosity::render(&baked.solution, &baked.field, camera, &options, progress)
+        radiosity::render(&baked, camera, &options, progress)
     };
     let view = camera.as_ref().filter(|_| wants_view).map(look).transpose()?;
     let exposure = arguments.picture.exposure.or(view.as_ref().map(|v| v.picture.exposure())).unwrap_or(0.0);

@@ -37,12 +37,14 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     progress.part("picture");
     let (width, height) = views::picture_size(&camera, arguments.picture.size);
     let render = RenderOptions { width, height, ..RenderOptions::default() };
-    let picture = radiosity::render(&baked.solution, &baked.field, &camera, &render, progress)?.picture;
+    let view = radiosity::render(&baked, &camera, &render, progress)?;
+    let audit = view.audit(&baked, progress)?;
+    let picture = view.picture;
     let exposure = arguments.picture.exposure.unwrap_or_else(|| picture.exposure());
     outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
     outputs.commit()?;
 
-    let error = ErrorReport::new(&baked.field_audit, &baked.field_audit, &arguments.solve);
+    let error = ErrorReport::new(&audit, &audit, &arguments.solve);
     if global.json {
         let result = serde_json::json!({
             "event": "result", "error": error, "output": arguments.output, "width": width, "height": height,

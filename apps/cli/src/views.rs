@@ -20,7 +20,7 @@ pub fn for_page(view: &View) -> View {
     let n = picture.width.max(picture.height).div_ceil(PAGE_SIDE).max(1);
     let (width, height) = (picture.width / n, picture.height / n);
     if n == 1 || width == 0 || height == 0 {
-        return View { picture: picture.clone(), illuminance: view.illuminance.clone() };
+        return view.clone();
     }
     let mut small = Picture { width, height, pixels: Vec::new(), surfaces: Vec::new() };
     let mut illuminance = Vec::new();
@@ -32,7 +32,7 @@ pub fn for_page(view: &View) -> View {
         small.surfaces.push(block.clone().any(|i| picture.surfaces[i]));
         illuminance.extend(block.clone().map(|i| view.illuminance[i]).nth((n * n / 2) as usize));
     }
-    View { picture: small, illuminance }
+    View { picture: small, illuminance, watched: Vec::new() }
 }
 
 /// Illuminance in the colours of its classes, PNG.

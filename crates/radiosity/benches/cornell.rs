@@ -123,7 +123,8 @@ fn main() {
     let engine = |rays: u32| {
         let options = SolveOptions { element_size: Some(ELEMENT_SIZE), rays: rays as usize, ..SolveOptions::default() };
         let solution = Solution::new(&tracer, &options, &()).expect("the box fits into memory and converges");
-        let (field, shadowing) = (solution.indirect_field(), Shadowing { places: 1, rays });
+        let field = solution.indirect_field(&()).expect("nobody stops it");
+        let shadowing = Shadowing { places: 1, rays };
         let answer = solution.at(&exam.stations, Indirect::Field(&field), &shadowing, &());
         answer.expect("nobody stops it").irradiance
     };

@@ -1,6 +1,6 @@
 //! From a scene to a solution whose error is known: refine until the audit is content.
 
-use crate::answer::Station;
+use crate::answer::{SMOOTHING, Station};
 use crate::measure::{Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages};
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
@@ -8,9 +8,6 @@ use radiosity_scene::Bands;
 use radiosity_trace::Tracer;
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor, Field};
-
-/// By how much the continuous field lessens the noise of cells: a corner is the mean of some six of them.
-const SMOOTHING: f64 = 2.4;
 
 /// Cells to aim for: 10,000 leave those of a room with a garden 0.4 m wide, and contacts blurred.
 const CELLS: usize = 30_000;
@@ -56,8 +53,6 @@ pub struct Baked<'a> {
     pub shadowing: Shadowing,
     /// What the referee says of light that is read as `gather` tells.
     pub audit: Audit,
-    /// What it says of the field alone, which pictures are taken from.
-    pub field_audit: Audit,
     /// Whether the audit's upper bound meets the asked error.
     pub achieved: bool,
     /// The rounds.
@@ -91,17 +86,16 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut auditor = Auditor::new(tracer, watched.iter().map(|s| s.place).collect(), options.seed);
     let mut rounds = Vec::new();
     loop {
-        let field = solution.indirect_field();
+        let field = solution.indirect_field(monitor)?;
         let answer = solution.at(&watched, Indirect::Field(&field), &shadowing, monitor)?;
         let mut light = answer.irradiance;
         let judge = |auditor: &mut Auditor, light: &[Bands]| {
             certify(auditor, |auditor| auditor.judge(light), options.error, most_paths, &stages, monitor)
         };
-        let field_audit = judge(&mut auditor, &light)?;
-        let mut audit = field_audit.clone();
+        let mut audit = judge(&mut auditor, &light)?;
         let mut gather = 0;
-        // The field knows neither contacts below the size of its elements nor normals that are not the faces': gathering at
-        // each point does, and costs less than elements that small.
+        // The field does not know contacts below the size of its elements: gathering at each point does, and costs less
+        // than elements that small.
         let mut rays = gather_rays(options.error);
         for _ in 0..GATHERS {
             if audit.upper <= options.error {
@@ -136,7 +130,6 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 gather,
                 shadowing,
                 audit,
-                field_audit,
                 achieved,
                 rounds,
                 stages,

@@ -1,11 +1,13 @@
 //! A picture of a solution: direct light evaluated for each pixel, indirect light from the continuous field.
 
 use crate::answer::Station;
+use crate::measure::{certify, most_paths};
 use crate::monitor::Monitor;
-use crate::{Error, Indirect, Solution};
-use radiosity_scene::{Camera, luminance};
+use crate::{Baked, Error, Indirect};
+use radiosity_scene::{Bands, Camera, luminance};
+use radiosity_trace::Place;
 use radiosity_transport::Shadowing;
-use radiosity_view::{Field, Picture, ViewRays};
+use radiosity_view::{Audit, Auditor, Picture, ViewRays};
 
 /// How to make a picture.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +22,7 @@ pub struct RenderOptions {
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        RenderOptions { width: 1280, height: 720, shadowing: Shadowing { places: 1, rays: 128 } }
+        RenderOptions { width: 1280, height: 720, shadowing: Shadowing { places: 1, rays: 256 } }
     }
 }
 
@@ -31,24 +33,41 @@ pub struct View {
     pub picture: Picture,
     /// Illuminance of the surface that fills most of each pixel, lx; not a number where there is none.
     pub illuminance: Vec<f32>,
+    /// Places that are seen, spread over the pixels, and their irradiance there.
+    pub watched: Vec<(Place, Bands)>,
 }
 
-/// Looks at a solution; `field` is its indirect field.
+impl View {
+    /// What the referee says of the irradiance that is seen.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn audit(&self, baked: &Baked, monitor: &dyn Monitor) -> Result<Audit, Error> {
+        let (places, light): (Vec<Place>, Vec<Bands>) = self.watched.iter().copied().unzip();
+        let mut auditor = Auditor::new(baked.solution.tracer(), places, u64::from(baked.seed));
+        let judge = |auditor: &Auditor| auditor.judge(&light);
+        certify(&mut auditor, judge, baked.error, most_paths(baked.error), &baked.stages, monitor)
+    }
+}
+
+/// Looks at a solution, less noisy where it is looked at than the error that it was made for.
 ///
 /// # Errors
 /// [`Error::Stopped`].
-pub fn render(
-    solution: &Solution,
-    field: &Field,
-    camera: &Camera,
-    options: &RenderOptions,
-    monitor: &dyn Monitor,
-) -> Result<View, Error> {
+pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: &dyn Monitor) -> Result<View, Error> {
     monitor.stage("picture");
+    let solution = &baked.solution;
     let view = ViewRays::new(solution.tracer(), camera, options.width, options.height);
     let stations: Vec<Station> =
         view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
-    let answer = solution.at(&stations, Indirect::Field(field), &options.shadowing, monitor)?;
+    let mut looks = vec![0; solution.elements.cells()];
+    for Station { place, uv, side } in &stations {
+        if let Some(element) = solution.elements.at(place.triangle, uv.x as f32, uv.y as f32, *side) {
+            looks[solution.elements.cell(element)] += 1;
+        }
+    }
+    let field = solution.indirect_field_on(&looks, baked.error, monitor)?;
+    let answer = solution.at(&stations, Indirect::Field(&field), &options.shadowing, monitor)?;
     let pixels = view.own.len();
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
     for (seen, e) in view.seen.iter().zip(&answer.irradiance) {
@@ -57,5 +76,8 @@ pub fn render(
             (share[pixel], illuminance[pixel]) = (response, luminance(*e));
         }
     }
-    Ok(View { picture: view.picture(&answer.irradiance), illuminance })
+    let stride = stations.len().div_ceil(baked.watched.len().max(1)).max(1);
+    let seen = stations.iter().map(|station| station.place).zip(answer.irradiance.iter().copied());
+    let watched = seen.skip(stride / 2).step_by(stride).collect();
+    Ok(View { picture: view.picture(&answer.irradiance), illuminance, watched })
 }

@@ -319,6 +319,14 @@ impl<'a> Solution<'a> {
         &self.indirect
     }
 
+    /// The same as the two halves of its rays tell it.
+    pub(crate) fn indirect_halves(&self) -> Vec<[Bands; 2]> {
+        let both = |(daylight, of_elements): (&[Bands; 2], [[f32; 4]; 2])| {
+            std::array::from_fn(|k| std::array::from_fn(|band| (daylight[k][band] + of_elements[k][band]).max(0.0)))
+        };
+        self.table.daylight().iter().zip(self.table.halves(&self.of_elements())).map(both).collect()
+    }
+
     /// Radiosity B = E + ρ H of each element, lm/m² per band.
     pub fn radiosity(&self) -> Vec<Bands> {
         (0..self.elements.len())
@@ -352,8 +360,7 @@ impl<'a> Solution<'a> {
     /// irradiance E, as the eye takes it, and by the weight E/(E + mean E), so that neither the dark insides of furniture
     /// nor a bright garden decide.
     pub fn row_noise(&self) -> f64 {
-        let halves = self.table.halves(&self.of_elements());
-        let daylight = self.table.daylight();
+        let halves = self.indirect_halves();
         let weight = self.exposed_area();
         let y = |e: usize| f64::from(luminance(self.irradiance[e]));
         let mean = weight.iter().enumerate().map(|(e, w)| w * y(e)).sum::<f64>()
@@ -362,11 +369,7 @@ impl<'a> Solution<'a> {
         for cell in 0..self.elements.cells() {
             let (mut difference, mut flux, mut exposed) = (0.0, 0.0, 0.0);
             for e in self.elements.of_cell(cell).map(|e| e as usize) {
-                let half = |k: usize| {
-                    let [r, g, b, _] = halves[e][k];
-                    f64::from(luminance([r, g, b])) + f64::from(luminance(daylight[e][k]))
-                };
-                let (a, b) = (half(0), half(1));
+                let [a, b] = halves[e].map(|half| f64::from(luminance(half)));
                 difference += weight[e] * 0.5 * (a - b);
                 flux += weight[e] * y(e);
                 exposed += weight[e];

@@ -71,25 +71,26 @@ impl Gather<'_> {
             pilot.begin(means.len(), 2 * half_rays);
             let own = |k: usize| {
                 let i = chunk * CHUNK + k;
-                receivers.site(i).map(|site| (receivers.seed(i), frame(site.normal), site))
+                receivers.site(i).map(|site| (receivers.seed(i), site))
             };
-            let cast = |site: &Site, frame: &[DVec3; 3], [u, v, x, y]: [f32; 4], salt: u32| {
-                self.arriving(&site.place(x, y), cosine_direction(frame, f64::from(u), f64::from(v)), salt)
+            let cast = |site: &Site, [u, v, x, y]: [f32; 4], salt: u32| {
+                let place = site.place(x, y);
+                self.arriving(&place, cosine_direction(&frame(place.normal), f64::from(u), f64::from(v)), salt)
             };
             for k in 0..means.len() {
-                let Some((seed, frame, site)) = own(k) else { continue };
+                let Some((seed, site)) = own(k) else { continue };
                 let sequence = Sequence::new(seed, GATHER);
                 pilot.place(k, &site, 2 * half_rays);
                 for index in 0..2 * half_rays {
                     let point = sequence.point(index);
                     let half = usize::from(index >= half_rays);
-                    pilot.add(k, half, point, cast(&site, &frame, point, hash(hash(seed) ^ index)));
+                    pilot.add(k, half, point, cast(&site, point, hash(hash(seed) ^ index)));
                 }
             }
             for (k, mean) in means.iter_mut().enumerate() {
-                let Some((seed, frame, site)) = own(k) else { continue };
+                let Some((seed, site)) = own(k) else { continue };
                 *mean = pilot.mean(k, (&Sequence::new(seed, AGAIN), 0), |index, point| {
-                    cast(&site, &frame, point, hash(hash(seed ^ AGAIN) ^ index))
+                    cast(&site, point, hash(hash(seed ^ AGAIN) ^ index))
                 });
             }
             let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
