@@ -16,7 +16,8 @@ mod report;
 mod views;
 
 use clap::{Args, Parser, Subcommand};
-use radiosity::Faults;
+use radiosity::io::LoadError;
+use radiosity::{Faults, Severity};
 use std::process::ExitCode;
 
 /// Diffuse global illumination and radiative exchange by the radiosity method.
@@ -139,11 +140,23 @@ impl Failure {
     }
 }
 
-impl From<radiosity::io::LoadError> for Failure {
-    /// All faults of an input that cannot be used, one to a line.
-    fn from(error: radiosity::io::LoadError) -> Self {
-        // The message has its "error:" already.
-        Failure { code: 2, message: error.to_string(), faults: error.faults().cloned().unwrap_or_default() }
+impl From<Faults> for Failure {
+    /// The faults of an input that cannot be used, one to a line. Warnings tell why, as where all that was there was
+    /// dropped; notes never do.
+    fn from(faults: Faults) -> Self {
+        let told = faults.0.iter().filter(|fault| fault.severity > Severity::Note);
+        let message = told.map(ToString::to_string).collect::<Vec<_>>().join("\n");
+        Failure { code: 2, message, faults }
+    }
+}
+
+impl From<LoadError> for Failure {
+    fn from(error: LoadError) -> Self {
+        match error {
+            LoadError::Faults(faults) => faults.into(),
+            // The message has its "error:" already.
+            LoadError::Io { .. } => Failure { code: 2, message: error.to_string(), faults: Faults::default() },
+        }
     }
 }
 

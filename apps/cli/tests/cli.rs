@@ -325,6 +325,21 @@ fn the_lack_of_any_light_is_a_warning() {
     assert!(!room.run(["check", "a.obj", "--sky", "overcast:1000"]).out.contains("no light"));
 }
 
+/// Notes on the rest of a damaged file were printed below its fault.
+#[test]
+fn a_fault_that_ends_a_run_is_told_with_its_reasons_and_nothing_else() {
+    let room = Room::new("fatal");
+    room.write("short.gltf", &LAMP.replace("\"count\":3", "\"count\":9"));
+    room.write("nan.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n");
+    for (name, severities) in [("short.gltf", &["error"][..]), ("nan.obj", &["warning", "warning", "error"])] {
+        for verb in ["check", "bake"] {
+            let run = room.run([verb, "-v", name]);
+            let told: Vec<&str> = run.err.lines().filter_map(|line| Some(line.split_once(':')?.0)).collect();
+            assert_eq!((run.code, told.as_slice()), (Some(2), severities), "{run:?}");
+        }
+    }
+}
+
 /// A triangle under a point light.
 const LAMP: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
 "extensionsUsed":["KHR_lights_punctual"],

@@ -2,7 +2,7 @@
 
 use crate::source::read_plain_file;
 use crate::{Document, Folder, LoadError, LoadOptions, gltf, obj};
-use radiosity_scene::{Faults, Mesh, Scene, counted};
+use radiosity_scene::{Fault, Faults, Mesh, Scene, counted};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -32,12 +32,11 @@ impl Loaded {
             warn_of_small_triangles(file, &scene, &mut faults);
         }
         if faults.0.len() > MAX_FAULTS {
-            let (more, errors) = (faults.0.len() - MAX_FAULTS, faults.has_errors());
             // The worst first, so that no error is lost behind warnings.
             faults.0.sort_by_key(|fault| std::cmp::Reverse(fault.severity));
-            faults.0.truncate(MAX_FAULTS);
-            debug_assert_eq!(errors, faults.has_errors());
-            faults.note("", format!("and {more} more"), "");
+            let more = faults.0.split_off(MAX_FAULTS);
+            let what = format!("and {} more", more.len());
+            faults.0.push(Fault { severity: more[0].severity, place: file.to_owned(), what, hint: String::new() });
         }
         if faults.has_errors() { Err(LoadError::Faults(faults)) } else { Ok(Loaded { scene, faults, document }) }
     }
