@@ -150,7 +150,7 @@ pub struct Input {
     pub scene: Scene,
     /// Its welded triangles.
     pub mesh: Mesh,
-    /// Warnings and notes.
+    /// What is wrong with it; with errors it can be described and not lit.
     pub faults: Faults,
     /// The glTF it came from.
     pub document: Option<Document>,
@@ -161,6 +161,9 @@ pub struct Input {
 /// Reads the scene and its sky; all faults at once.
 pub fn load(arguments: &SceneArguments, global: &Global, progress: &Progress) -> Result<Input, Failure> {
     let input = read(arguments)?;
+    if input.faults.has_errors() {
+        return Err(input.faults.into());
+    }
     for fault in &input.faults.0 {
         if fault.severity > Severity::Note || global.verbose {
             progress.say(&fault.to_string());

@@ -3,13 +3,15 @@
 mod flipped;
 mod overlap;
 
-use radiosity::{Faults, Material, Mesh, Scene, counted};
+use radiosity::{Faults, Mesh, PointLight, Scene, counted};
 use std::collections::HashMap;
 
 /// Adds the faults of a scene that can be read; `title` is what the scene is called.
 pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
-    if scene.lights.is_empty() && scene.sky.is_black() && !scene.materials.iter().any(Material::emits) {
-        faults.warning(title, "there is no light", "give it a sky, --sky overcast:10000, or lamps");
+    if is_dark(scene) {
+        let hint =
+            "give it a sky, --sky overcast:10000, faces an emissive material, or lamps, KHR_lights_punctual in glTF";
+        faults.error(title, "there is no light", hint);
     }
     let open = open_edges(mesh);
     if open > 0 {
@@ -49,6 +51,13 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
     if overlaps.more {
         faults.note(title, "too many triangles lie in one place; overlapping surfaces were not all searched for", "");
     }
+}
+
+/// Whether nothing gives light: materials count where a face has them.
+fn is_dark(scene: &Scene) -> bool {
+    let is_lamp = |light: &PointLight| light.intensity.iter().any(|&i| i > 0.0);
+    let shines = |triangle| scene.material(triangle).emits();
+    scene.sky.is_black() && !scene.lights.iter().any(is_lamp) && !(0..scene.triangles.len()).any(shines)
 }
 
 /// Edges of the welded mesh that only one face has.
