@@ -20,6 +20,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<(), Failure> {
     let input = input::read(&arguments.scene)?;
     if global.json {
         print(&describe(&input).to_string())?
+    } else if global.quiet {
+        let warnings = input.faults.0.iter().filter(|fault| fault.severity == Severity::Warning);
+        warnings.map(ToString::to_string).try_for_each(|warning| print(&warning))?
     } else {
         print(&summary(&input))?
     }

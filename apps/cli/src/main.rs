@@ -44,7 +44,7 @@ pub struct Global {
     /// Progress and result as lines of JSON on standard output.
     #[arg(long, global = true)]
     json: bool,
-    /// Say nothing but errors; with --json, errors and the result.
+    /// Say nothing but errors (`check`: and warnings); with --json, errors and the result.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// Say more: the rounds of refinement, notes on the input.

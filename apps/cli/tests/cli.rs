@@ -234,6 +234,13 @@ fn check_lists_what_is_there() {
     let faults = events[0]["faults"].as_array().unwrap();
     assert!(faults.iter().any(|f| f["severity"] == "error" && f["place"] == "bad.obj"), "{faults:?}");
 
+    // Quietly, what is there is not listed, nor what is only worth knowing.
+    let quiet = room.run(["check", "-q"]);
+    assert_eq!((quiet.code, quiet.out.as_str(), quiet.err.as_str()), (Some(0), "", ""));
+    room.write("twice.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 3\n");
+    let quiet = room.run(["check", "-q", "twice.obj", "--sky", "uniform:1"]);
+    assert!(quiet.out.starts_with("warning: twice.obj: ") && quiet.out.lines().count() == 1, "{quiet:?}");
+
     let said = room.run(["check"]).out;
     assert!(said.contains("38 triangles in 19 objects") && said.contains("4 materials"), "{said}");
 }
