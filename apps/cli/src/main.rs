@@ -15,6 +15,7 @@ mod render;
 mod report;
 mod views;
 
+use clap::error::ContextKind;
 use clap::{Args, Parser, Subcommand};
 use radiosity::io::LoadError;
 use radiosity::{Faults, Severity};
@@ -67,7 +68,7 @@ enum Verb {
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return refuse(&error),
+        Err(error) => return refuse(error),
     };
     let progress = progress::Progress::new(&cli.global);
     let result = work(&cli, &progress);
@@ -92,7 +93,9 @@ fn main() -> ExitCode {
 }
 
 /// A call that cannot be read, or one for help.
-fn refuse(error: &clap::Error) -> ExitCode {
+fn refuse(mut error: clap::Error) -> ExitCode {
+    // The advice to write `-- -x`, which would name a scene; that of similar options is kept elsewhere.
+    error.remove(ContextKind::Suggested);
     let wants_json = std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| word == "--json");
     if wants_json && error.use_stderr() {
         let message = error.to_string().trim_end().to_owned();

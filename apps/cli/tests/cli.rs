@@ -97,6 +97,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("", "Usage"),
         ("bakke", "similar subcommand exists: 'bake'"),
         ("bake --eror 1%", "similar argument exists: '--error'"),
+        ("bake -error 1%", "unexpected argument '-e'"),
         ("bake --error 1", "such as 1%"),
         ("bake --error nan", "such as 1%"),
         ("bake --error 0%", "such as 1%"),
@@ -155,6 +156,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         assert!(run.err.contains(said), "{call}: {}", run.err);
         assert!(run.out.is_empty() && !run.err.contains("panicked"), "{call}: {run:?}");
         assert!(run.err.matches("error:").count() <= 1, "{call}: {}", run.err);
+        assert!(!run.err.contains("as a value"), "{call}: {}", run.err);
     }
     assert_eq!(room.names(), ["bad.csv", "bad.obj", "one.obj"], "nothing is left of a failed run");
     for help in ["--help", "--version", "bake --help"] {
