@@ -120,6 +120,10 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         };
         for (page, (size, texels)) in map.pages.iter().zip(&map.irradiance).enumerate() {
             let beside = page_path(&target, page);
+            // How many there are was not known before.
+            if page > 0 {
+                outputs.promise(&beside, &["exr"])?;
+            }
             outputs.stage(&beside, &encode_exr(size[0], size[1], texels).map_err(Failure::work)?)?;
             pages.push(beside);
         }

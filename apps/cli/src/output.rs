@@ -70,15 +70,18 @@ impl Outputs {
             return refuse("is a folder".to_owned());
         }
         let folder = folder(path);
+        // A file has one place by whatever name, also by that of a link to it.
         let place = match canonicalize(folder) {
-            Ok(folder) if folder.is_dir() => folder.join(path.file_name().unwrap_or_default()),
+            Ok(folder) if folder.is_dir() => {
+                canonicalize(path).unwrap_or_else(|_| folder.join(path.file_name().unwrap_or_default()))
+            }
             Ok(_) => return refuse(format!("{} is no folder", folder.display())),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return refuse(format!("there is no folder {}; make it first", folder.display()));
             }
             Err(error) => return refuse(error.to_string()),
         };
-        if self.inputs.contains(&canonicalize(path).unwrap_or(place.clone())) {
+        if self.inputs.contains(&place) {
             return refuse("is read by this run and would be replaced; choose another name".to_owned());
         }
         if self.promised.contains(&place) {
@@ -181,6 +184,29 @@ mod tests {
         outputs.commit().unwrap();
         assert_eq!((read_to_string(&a).unwrap(), read_to_string(&b).unwrap()), ("new".to_owned(), "also".to_owned()));
         assert_eq!(names(&room), ["a.csv", "b.csv"]);
+        std::fs::remove_dir_all(room).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn one_file_by_two_names_is_promised_once() {
+        let room = room("names");
+        let at = |name: &str| room.join(name);
+        create_dir(at("folder")).unwrap();
+        std::os::unix::fs::symlink("folder", at("link")).unwrap();
+        std::os::unix::fs::symlink("a.csv", at("b.csv")).unwrap();
+        write(at("a.csv"), "").unwrap();
+        let mut outputs = Outputs::new(&[]);
+        for (name, is_new) in [
+            ("a.csv", true),
+            ("./a.csv", false),
+            ("folder/../a.csv", false),
+            ("b.csv", false),
+            ("folder/a.csv", true),
+            ("link/a.csv", false),
+        ] {
+            assert_eq!(outputs.promise(&at(name), &["csv"]).is_ok(), is_new, "{name}");
+        }
         std::fs::remove_dir_all(room).unwrap();
     }
 

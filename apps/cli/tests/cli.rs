@@ -528,6 +528,16 @@ fn the_same_bytes_for_any_number_of_threads() {
     }
 }
 
+/// The page took the picture's temporary file, and the run ended with half of its files in place.
+#[test]
+fn a_picture_named_like_a_further_page_is_refused() {
+    let room = Room::new("page");
+    let call = ["bake", "--max-atlas", "64", "-o", "a.glb", "--image", "a.lightmap1.exr", "--texels-per-metre", "40"];
+    let run = room.run(call.iter().chain(&COARSE));
+    assert!(run.code == Some(2) && run.err.contains("a.lightmap1.exr: two outputs have this name"), "{run:?}");
+    assert_eq!(room.names(), [""; 0]);
+}
+
 #[test]
 fn a_run_that_fails_late_changes_no_file() {
     let room = Room::new("late");
