@@ -148,6 +148,8 @@ impl Progress {
 
     fn show(&self, name: &str) {
         let mut stage = self.lock();
+        // Entered again, as for each portion of texels, a stage is no news.
+        let is_new = stage.name != name;
         (stage.name, stage.since) = (name.to_owned(), Instant::now());
         let round = stage.round;
         drop(stage);
@@ -157,7 +159,7 @@ impl Progress {
             None => name.to_owned(),
         });
         self.last.store(0, Ordering::Relaxed);
-        if self.json {
+        if self.json && is_new {
             self.tell(&json!({
                 "event": "stage", "stage": name, "round": round.map(|r| r[0]), "most_rounds": round.map(|r| r[1]),
                 "seconds": self.seconds(),
@@ -185,7 +187,10 @@ impl Monitor for Progress {
     }
 
     fn round(&self, round: usize, most: usize) {
-        self.lock().round = Some([round, most]);
+        let mut stage = self.lock();
+        stage.round = Some([round, most]);
+        // In a new round the same stage is news.
+        stage.name.clear();
     }
 
     fn step(&self, done: usize, total: usize) -> bool {

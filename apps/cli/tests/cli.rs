@@ -385,6 +385,10 @@ fn bake_writes_model_picture_and_reports() {
     let call = ["bake", "--json", "-o", "lit.glb", "--image", "lit.png", "--report", "r.json", "--report", "r.html"];
     let run = room.run(call.iter().chain(&COARSE).chain(&["--texels-per-metre", "20", "--seed", "3"]));
     let result = run.result();
+    // Each stage is told once, however often it is entered on end.
+    let stages: Vec<Value> = run.events().into_iter().filter(|e| e["event"] == "stage").collect();
+    let same = |a: &Value, b: &Value| (&a["stage"], &a["round"]) == (&b["stage"], &b["round"]);
+    assert!(stages.len() > 5 && stages.windows(2).all(|two| !same(&two[0], &two[1])), "{stages:?}");
     let files = ["lit.glb", "lit.lightmap0.exr", "lit.png", "r.html", "r.json"];
     assert_eq!(room.names(), files);
     assert_eq!((&room.read("lit.glb")[..4], &room.read("lit.png")[1..4]), (&b"glTF"[..], &b"PNG"[..]));
