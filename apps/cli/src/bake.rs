@@ -26,7 +26,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
     /// Texels per metre of the lightmap; by default about 200 000 texels in all, and up to 4 million where --error needs them.
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with_all = ["vertices", "unlit"],
-        value_parser = numbers::density)]
+        value_parser = numbers::positive)]
     texels_per_metre: Option<f64>,
     /// Largest width and height of a lightmap page.
     #[arg(long, value_name = "N", default_value_t = 4096, conflicts_with_all = ["vertices", "unlit"],
@@ -73,6 +73,10 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
     progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
+    arguments.solve.refuse_tiny_elements(&input.mesh)?;
+    if let Some(density) = arguments.texels_per_metre {
+        arguments.solve.refuse_tiny_texels(&input.mesh, density)?;
+    }
     let tracer = Tracer::new(&input.scene, &input.mesh);
     let is_json = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let is_exposed = arguments.unlit || !arguments.report.iter().all(is_json);

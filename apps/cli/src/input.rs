@@ -4,7 +4,9 @@ use crate::progress::Progress;
 use crate::{Failure, Global, faults, numbers};
 use clap::Args;
 use radiosity::io::{Document, LoadOptions};
-use radiosity::{Faults, Mesh, Scene, Severity, Sky, Up};
+use radiosity::transport::HitTable;
+use radiosity::{Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up};
+use std::f64::consts::SQRT_2;
 use std::path::{Path, PathBuf};
 
 /// The scene and how to read it.
@@ -77,6 +79,56 @@ impl SolveArguments {
     pub fn options(&self) -> radiosity::SolveOptions {
         let default = radiosity::SolveOptions::default();
         radiosity::SolveOptions { element_size: self.element_size, memory: self.memory, ..default }
+    }
+
+    /// Refuses elements that the memory would not hold if they were as small as asked. Triangles are cut into some thousand
+    /// at most, which may take long and is not what was asked for either.
+    pub fn refuse_tiny_elements(&self, mesh: &Mesh) -> Result<(), Failure> {
+        let Some(size) = self.element_size else { return Ok(()) };
+        let bytes = HitTable::bytes(1, self.options().rays);
+        self.refuse_beyond_memory(mesh, "--element-size", "elements", bytes, 0.5 * size * size, |width| {
+            format!("{} or more", numbers::rough(width * SQRT_2))
+        })
+    }
+
+    /// Refuses texels that the memory would not hold, before there is light to put into them.
+    pub fn refuse_tiny_texels(&self, mesh: &Mesh, density: f64) -> Result<(), Failure> {
+        self.refuse_beyond_memory(
+            mesh,
+            "--texels-per-metre",
+            "texels",
+            TEXEL_BYTES,
+            (density * density).recip(),
+            |width| format!("{} or less", numbers::rough(width.recip())),
+        )
+    }
+
+    /// Refuses to cut surfaces into more pieces, of an area and of bytes each, than the memory holds. `instead` is told the
+    /// width of the smallest that fit.
+    fn refuse_beyond_memory(
+        &self,
+        mesh: &Mesh,
+        option: &str,
+        pieces: &str,
+        bytes: usize,
+        piece: f64,
+        instead: impl FnOnce(f64) -> String,
+    ) -> Result<(), Failure> {
+        let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+        let (bytes, allowed) = (bytes as f64, self.memory as f64);
+        let (count, needed) = (area / piece, area / piece * bytes);
+        if needed <= allowed {
+            return Ok(());
+        }
+        // A tenth to spare, since the advice is rounded.
+        let instead = instead(1.1 * (area * bytes / allowed).sqrt());
+        let megabyte = f64::from(1 << 20);
+        Err(Failure::input(format!(
+            "{option}: {count:.1e} {pieces} need {:.1e} MB at least; {:.0} MB are allowed (use {instead}, or allow more by \
+             --memory)",
+            needed / megabyte,
+            allowed / megabyte
+        )))
     }
 
     /// As the library takes them to light surfaces.

@@ -166,7 +166,9 @@ impl From<LoadError> for Failure {
 impl From<radiosity::Error> for Failure {
     fn from(error: radiosity::Error) -> Self {
         match error {
-            radiosity::Error::Empty(_) | radiosity::Error::Memory { .. } => Failure::input(error),
+            radiosity::Error::Empty(_) | radiosity::Error::Memory { .. } | radiosity::Error::Lightmap(_) => {
+                Failure::input(error)
+            }
             other => Failure::work(other),
         }
     }

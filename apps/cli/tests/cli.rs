@@ -92,6 +92,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
     let room = Room::new("wrong");
     room.write("bad.obj", "v 0 0 0\nf 1 2 3\n");
     room.write("bad.csv", "x,y,z\n1,2,3\n");
+    room.write("good.csv", "x,y,z,nx,ny,nz\n0.3,0,0.3,0,1,0\n");
     room.write("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     for (call, said) in [
         ("", "Usage"),
@@ -107,7 +108,15 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("bake --seed one", "invalid digit"),
         ("bake --size 0x5", "1280x720"),
         ("bake --exposure inf", "-60 to 60"),
-        ("bake --texels-per-metre 1e9", "up to 1000000"),
+        ("bake --texels-per-metre 1e9", "1.9e18 texels need 7.3e14 MB at least; 4096 MB are allowed (use 2149 or less"),
+        ("bake --texels-per-metre inf", "above 0"),
+        ("bake --texels-per-metre 104 --memory 8M --element-size 0.3 --error 50%", "ask for fewer per metre"),
+        (
+            "bake --element-size 1e-9",
+            "3.8e18 elements need 9.4e14 MB at least; 4096 MB are allowed (use 0.00053 or more",
+        ),
+        ("render -o a.png --element-size 1e-9", "elements need"),
+        ("measure --points good.csv --element-size 1e-9", "elements need"),
         ("bake --max-atlas 3", "16..=16384"),
         ("bake --vertices --unlit", "cannot be used with"),
         ("bake --threads 0", "1..=1024"),
@@ -158,7 +167,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         assert!(run.err.matches("error:").count() <= 1, "{call}: {}", run.err);
         assert!(!run.err.contains("as a value"), "{call}: {}", run.err);
     }
-    assert_eq!(room.names(), ["bad.csv", "bad.obj", "one.obj"], "nothing is left of a failed run");
+    assert_eq!(room.names(), ["bad.csv", "bad.obj", "good.csv", "one.obj"], "nothing is left of a failed run");
     for help in ["--help", "--version", "bake --help"] {
         assert_eq!(room.run(help.split(' ')).code, Some(0));
     }

@@ -35,7 +35,7 @@ pub use bake::{BakeOptions, Baked, bake};
 pub use cornell::cornell_box;
 pub use error::Error;
 pub use judge::WrittenRound;
-pub use lightmap::{Lightmap, lightmap};
+pub use lightmap::{Lightmap, TEXEL_BYTES, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};
 pub use monitor::{Monitor, Stages};
 pub use render::{RenderOptions, View, render};

@@ -61,7 +61,7 @@ impl Lightmap {
 }
 
 /// Memory that a texel takes while it is worked out, about.
-const TEXEL_BYTES: usize = 400;
+pub const TEXEL_BYTES: usize = 400;
 
 /// Texels that the program spends where no density is asked for.
 const AUTOMATIC_TEXELS: f64 = 200_000.0;
