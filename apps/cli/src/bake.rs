@@ -213,13 +213,13 @@ fn tell(report: &Report, global: &Global, progress: &Progress) -> Result<(), Fai
     let (solution, light) = (&report.solution, &report.illuminance);
     let memory = report.peak_memory_mb.map_or(String::new(), |mb| format!(", {mb:.0} MB"));
     progress.say(&format!(
-        "{} elements in {} cells x {} rays, {:.1} s{memory}; illuminance {:.4} / {:.4} / {:.4} lx (min / mean / max)",
+        "{} elements in {} cells x {} rays, {:.1} s{memory}; mean illuminance {:.4} lx, 95 % of the lit area above {:.4}, brightest {:.4}",
         solution.elements,
         solution.cells,
         solution.rays_per_cell,
         report.time.seconds,
-        light.least,
         light.mean,
+        light.low,
         light.largest,
     ));
     for output in &report.outputs {

@@ -8,11 +8,13 @@ pub const LOWER_IS_ZERO: &str = "one-sided 95 % bound: the audit cannot tell the
 pub const SOLUTION: &str = "the same for the solution, before it is written into texels or vertices";
 pub const BIAS: &str = "mean difference over mean illuminance";
 
-pub const LEAST: &str = "the darkest element";
+pub const LOW: &str =
+    "95 % of the area that any light reaches gets more; the rest are corners, cracks, places behind things";
 pub const MEAN: &str = "by area, over all exposed surfaces";
 pub const MEDIAN: &str = "half of the area gets more";
 pub const LARGEST: &str = "the brightest element";
-pub const UNIFORMITY: &str = "least over mean, of all surfaces; not that of a task area";
+pub const UNIFORMITY: &str =
+    "low over mean, of all surfaces; not the least over mean of a task area, for which there is `measure`";
 
 pub const EMITTED: &str = "given off by luminous surfaces";
 pub const FROM_POINT_LIGHTS: &str = "received from lights without area: point, spot, directional";
@@ -46,7 +48,7 @@ pub const ABOUT: &[(&str, &str)] = &[
     ("error.lower_95_one_sided", LOWER),
     ("error.bias", BIAS),
     ("error.solution_estimated", SOLUTION),
-    ("illuminance.least", "lx; the darkest element"),
+    ("illuminance.low", "lx; 95 % of the area that any light reaches gets more"),
     ("illuminance.mean", "lx; by area, over all exposed surfaces"),
     ("illuminance.classes", "lx; share of the exposed area from one illuminance to another"),
     ("rounds", "after each round of refinement: error as estimated, upper as its one-sided 95 % bound, seconds so far"),

@@ -44,9 +44,9 @@ fn scale(classes: &[Class]) -> String {
 pub fn illuminance(report: &Report) -> String {
     let light = &report.illuminance;
     let lux = |x: f64| with_unit(x, "lx");
-    let uniform = uniformity(light.least / light.mean);
+    let uniform = uniformity(light.low / light.mean);
     let mut body = cards(&[
-        ("Least", lux(light.least), figures::LEAST),
+        ("Low", lux(light.low), figures::LOW),
         ("Mean", lux(light.mean), figures::MEAN),
         ("Median", lux(light.median), figures::MEDIAN),
         ("Largest", lux(light.largest), figures::LARGEST),
@@ -58,7 +58,7 @@ pub fn illuminance(report: &Report) -> String {
         let row = |(i, class): (usize, &Class)| {
             let (from, to) = (number(class.from), number(class.to));
             let name = match i {
-                0 if light.least < class.from => format!("below {to}\u{a0}lx"),
+                0 => format!("below {to}\u{a0}lx"),
                 i if i == last && light.largest > class.to => format!("above {from}\u{a0}lx"),
                 _ => format!("{from}\u{a0}–\u{a0}{to}\u{a0}lx"),
             };
@@ -69,12 +69,12 @@ pub fn illuminance(report: &Report) -> String {
     }
     if !light.surfaces.is_empty() {
         let row = |s: &crate::illuminance::SurfaceLight| {
-            let [mean, least, largest, area] = [s.mean, s.least, s.largest, s.area].map(number);
-            vec![escape(&s.name), mean, least, largest, uniformity(s.least / s.mean), area]
+            let [mean, low, largest, area] = [s.mean, s.low, s.largest, s.area].map(number);
+            vec![escape(&s.name), mean, low, largest, uniformity(s.low / s.mean), area]
         };
         let rows: Vec<Vec<String>> = light.surfaces.iter().map(row).collect();
         body += "<h3>By surface</h3>";
-        body += &table(&["Object", "Mean, lx", "Least, lx", "Largest, lx", "Uniformity", "Area, m²"], &rows);
+        body += &table(&["Object", "Mean, lx", "Low, lx", "Largest, lx", "Uniformity", "Area, m²"], &rows);
         if light.further_surfaces > 0 {
             body += &note(&match light.further_surfaces {
                 1 => "1 smaller object is not listed.".to_owned(),

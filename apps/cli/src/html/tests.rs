@@ -51,7 +51,7 @@ fn example(rounds: usize) -> Report {
             finer: "try more".to_owned(),
         },
         illuminance: Illuminance {
-            least: 3.2,
+            low: 3.2,
             mean: 412.0,
             median: 377.0,
             largest: 8210.0,
@@ -59,7 +59,7 @@ fn example(rounds: usize) -> Report {
             surfaces: vec![SurfaceLight {
                 name: "desk <i>".to_owned(),
                 area: 1.4,
-                least: 300.0,
+                low: 300.0,
                 mean: 500.0,
                 largest: 612.0,
             }],
@@ -186,7 +186,7 @@ fn values_that_do_not_exist_are_unknown() {
         (error.upper_95_one_sided, error.lower_95_one_sided) = (value, value);
         report.balance = Balance { emitted: [few; 3], absorbed: [few; 3], defect: [value; 3], ..report.balance };
         let light = &mut report.illuminance;
-        (light.least, light.mean, light.largest, light.classes[1].share) = (value, value, value, value);
+        (light.low, light.mean, light.largest, light.classes[1].share) = (value, value, value, value);
         (report.time.stages[1].seconds, report.rounds[1].upper) = (value, value);
         (report.rounds[0].seconds, report.rounds[2].error, report.peak_memory_mb) = (value, value, None);
         sound(&page(&report, &[]));
