@@ -101,6 +101,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let exposure = arguments.picture.exposure.or(view.as_ref().map(|v| v.picture.exposure())).unwrap_or(0.0);
     let mut written: Vec<&Path> = Vec::new();
     if let (Some(path), Some(view)) = (&arguments.image, &view) {
+        views::explain_black(&view.picture, &input.scene, progress);
         outputs.stage(path, &views::encode(path, &view.picture, exposure)?)?;
         written.push(path);
     }

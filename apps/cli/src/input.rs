@@ -23,8 +23,9 @@ pub struct SceneArguments {
     /// Faces of an OBJ reflect on both sides.
     #[arg(long)]
     pub obj_double_sided: bool,
-    /// What escaping rays see: uniform:L (cd/m²), overcast:E (CIE overcast sky of horizontal illuminance E lx), or
-    /// hdr:FILE (equirectangular .hdr or .exr in cd/m²).
+    /// What escaping rays see: uniform:L (cd/m²), overcast:E (CIE overcast sky of horizontal illuminance E lx;
+    /// as the CIE has it, it ends at the horizon, and pictures are black below), or hdr:FILE (equirectangular .hdr or .exr
+    /// in cd/m²).
     #[arg(long, value_name = "SKY")]
     pub sky: Option<String>,
 }

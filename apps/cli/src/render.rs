@@ -41,6 +41,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let view = radiosity::render(&baked, &camera, &render, progress)?;
     let audit = view.audit(&baked, progress)?;
     let picture = view.picture;
+    views::explain_black(&picture, &input.scene, progress);
     let exposure = arguments.picture.exposure.unwrap_or_else(|| picture.exposure());
     outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
     outputs.commit()?;

@@ -4,8 +4,9 @@
 use crate::Failure;
 use crate::illuminance::Illuminance;
 use crate::input::PictureArguments;
+use crate::progress::Progress;
 use radiosity::io::image_out::{encode_exr, encode_png};
-use radiosity::{Camera, Picture, Scene, Tracer, View};
+use radiosity::{Camera, Picture, Scene, Sky, Tracer, View};
 use std::path::Path;
 
 /// Pictures in a report are made smaller than this, pixels: a page should open at once, and screens show no more.
@@ -45,6 +46,16 @@ pub fn false_colors(view: &View, scale: &Illuminance) -> Result<Vec<u8>, Failure
 /// Tone-mapped PNG bytes.
 pub fn png(picture: &Picture, exposure: f64) -> Result<Vec<u8>, Failure> {
     encode_png(picture.width, picture.height, &picture.tone_mapped(exposure)).map_err(Failure::work)
+}
+
+/// Tells why a picture is black where nothing stands, if a part of it is.
+pub fn explain_black(picture: &Picture, scene: &Scene, progress: &Progress) {
+    let pixels = picture.pixels.iter().zip(&picture.surfaces);
+    let black = pixels.filter(|(pixel, is_surface)| !**is_surface && **pixel == [0.0; 3]).count();
+    if matches!(scene.sky, Sky::Overcast { .. }) && black > picture.pixels.len() / 20 {
+        progress
+            .say("note: the overcast sky ends at the horizon, and the picture is black below; a ground would be lit");
+    }
 }
 
 /// Whether a picture is to hold luminances as they are.

@@ -492,6 +492,20 @@ fn a_picture_is_the_same_by_render_and_by_bake() {
     assert_eq!(room.read("a.exr")[..4], [0x76, 0x2f, 0x31, 0x01]);
 }
 
+/// Things stood before a black sky, and pictures were thought to have failed.
+#[test]
+fn the_black_below_an_overcast_sky_is_explained() {
+    let room = Room::new("horizon");
+    room.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let call = ["render", "a.obj", "-o", "a.png", "--error", "50%", "--rounds", "0", "--size", "32x32"];
+    for (sky, eye, is_told) in
+        [("overcast:1000", "0.3,3,3", true), ("uniform:300", "0.3,3,3", false), ("overcast:1000", "0.3,-3,3", false)]
+    {
+        let run = room.run(call.iter().chain(&["--sky", sky, "--eye", eye, "--target", "0.3,0.3,0"]));
+        assert_eq!((run.code, run.err.contains("ends at the horizon")), (Some(0), is_told), "{run:?}");
+    }
+}
+
 #[test]
 fn the_eye_is_put_where_it_is_asked() {
     let room = Room::new("eye");
