@@ -1,7 +1,8 @@
 //! Copies of materials that carry the light: one for each page of the lightmap, one for the unlit style, one for the
-//! single-sided layers of a double-sided surface.
+//! single-sided layers of a double-sided surface. The first takes the place of its original where nothing uses that any more.
 
 use super::glb::{Builder, Target};
+use super::rewrite::{indices, keep, renumber};
 use super::vertices::Glow;
 use super::{Encoding, Light, LitPrimitive, PageImage, Style};
 use radiosity_scene::Scene;
@@ -110,6 +111,38 @@ impl<'a> Materials<'a> {
         Some(index)
     }
 
+    /// Puts the first copy of a material in its place where nothing uses the original any more. Unlit copies stand beside
+    /// originals that are an author's: they have lost the colours that are in the vertices now.
+    pub fn settle(self, builder: &mut Builder, are_authors: bool) {
+        let mut used = vec![false; builder.list("materials").len()];
+        uses(builder, &mut |index| {
+            if let Some(used) = used.get_mut(*index) {
+                *used = true;
+            }
+        });
+        let mut copies: Vec<(usize, usize)> = self
+            .known
+            .iter()
+            .filter(|(key, _)| !(key.unlit && are_authors))
+            .filter_map(|(key, &copy)| Some((copy, key.source?)))
+            .collect();
+        copies.sort_unstable();
+        let (mut place, mut kept): (Vec<usize>, _) = ((0..used.len()).collect(), vec![true; used.len()]);
+        for (copy, source) in copies {
+            if used.get(source) == Some(&false) {
+                builder.list("materials").swap(source, copy);
+                (place[copy], kept[copy], used[source]) = (source, false, true);
+            }
+        }
+        let new = renumber(&kept);
+        uses(builder, &mut |index| {
+            if let Some(&place) = place.get(*index) {
+                *index = new[place];
+            }
+        });
+        keep(builder.list("materials"), &kept);
+    }
+
     /// The material that the scene gave to primitives without one.
     fn unnamed(&self, material: usize) -> Map<String, Value> {
         let color = self.scene.materials.get(material).map_or([1.0; 4], |m| m.base_color);
@@ -139,6 +172,11 @@ impl<'a> Materials<'a> {
             };
         }
     }
+}
+
+/// Visits every index of a material, in primitives and their variants.
+fn uses(builder: &mut Builder, visit: &mut dyn FnMut(&mut usize)) {
+    builder.list("meshes").iter_mut().for_each(|mesh| indices(mesh, "material", visit));
 }
 
 /// A number that a factor of 0..1 may hold.

@@ -48,6 +48,7 @@ pub(super) fn build(scene: &Scene, primitives: &[LitPrimitive], style: &Style) -
         let mesh = builder.push("meshes", json!({ "name": object.name, "primitives": parts }));
         children.push(builder.push("nodes", json!({ "name": object.name, "mesh": mesh })));
     }
+    materials.settle(&mut builder, false);
     for camera in &scene.cameras {
         let json = self::camera(camera);
         let index = builder.push("cameras", json);

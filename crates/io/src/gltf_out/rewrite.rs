@@ -113,6 +113,7 @@ pub(super) fn rewrite(
         place(&mut builder, node, &meshes, instances.as_deref());
     }
 
+    materials.settle(&mut builder, true);
     lamps::take_out(&mut builder, document);
     embed_pictures(&mut builder, document);
     compact(&mut builder, document, old_views)?;
@@ -314,7 +315,7 @@ fn compact(builder: &mut Builder, document: &Document, old_views: usize) -> Resu
 
     let mut used = vec![false; builder.list("bufferViews").len()];
     for (_, value) in builder.json.iter_mut().filter(|(name, _)| *name != "extras") {
-        views(value, &mut |index| {
+        indices(value, "bufferView", &mut |index| {
             if let Some(used) = used.get_mut(*index) {
                 *used = true;
             }
@@ -333,14 +334,14 @@ fn compact(builder: &mut Builder, document: &Document, old_views: usize) -> Resu
     }
     let new = renumber(&used);
     for (_, value) in builder.json.iter_mut().filter(|(name, _)| *name != "extras") {
-        views(value, &mut |index| *index = new.get(*index).copied().unwrap_or(*index));
+        indices(value, "bufferView", &mut |index| *index = new.get(*index).copied().unwrap_or(*index));
     }
     keep(builder.list("bufferViews"), &used);
     Ok(())
 }
 
 /// The index that each one kept will have.
-fn renumber(used: &[bool]) -> Vec<usize> {
+pub(super) fn renumber(used: &[bool]) -> Vec<usize> {
     used.iter()
         .scan(0, |next, &used| {
             let index = *next;
@@ -350,7 +351,7 @@ fn renumber(used: &[bool]) -> Vec<usize> {
         .collect()
 }
 
-fn keep(list: &mut Vec<Value>, used: &[bool]) {
+pub(super) fn keep(list: &mut Vec<Value>, used: &[bool]) {
     let mut used = used.iter();
     list.retain(|_| used.next().copied().unwrap_or(true));
 }
@@ -396,18 +397,18 @@ fn accessors(json: &mut Map<String, Value>, visit: &mut dyn FnMut(&mut usize)) {
     }
 }
 
-/// Visits every index of a buffer view: they are called `bufferView` wherever they stand; extras are the author's.
-fn views(json: &mut Value, visit: &mut dyn FnMut(&mut usize)) {
+/// Visits every index of one name, such as `bufferView`, wherever it stands; extras are the author's.
+pub(super) fn indices(json: &mut Value, name: &str, visit: &mut dyn FnMut(&mut usize)) {
     match json {
-        Value::Array(list) => list.iter_mut().for_each(|item| views(item, visit)),
+        Value::Array(list) => list.iter_mut().for_each(|item| indices(item, name, visit)),
         Value::Object(map) => {
-            for (name, value) in map.iter_mut().filter(|(name, _)| *name != "extras") {
-                match whole(value).filter(|_| name == "bufferView") {
+            for (own, value) in map.iter_mut().filter(|(own, _)| *own != "extras") {
+                match whole(value).filter(|_| own == name) {
                     Some(mut index) => {
                         visit(&mut index);
                         *value = index.into();
                     }
-                    None => views(value, visit),
+                    None => indices(value, name, visit),
                 }
             }
         }

@@ -240,8 +240,10 @@ fn vertex_light_stands_beside_the_authors_colours() {
 }
 
 #[test]
-fn a_lightmap_goes_onto_a_copy_of_the_material_in_the_next_free_set() {
-    let before = load(source().to_string().as_bytes());
+fn a_lightmap_goes_onto_the_material_in_the_next_free_set() {
+    let mut source = source();
+    source["materials"].as_array_mut().unwrap().push(json!({ "name": "unused" }));
+    let before = load(source.to_string().as_bytes());
     let lit = halved(&before.scene, on_page);
     let style = Style::Lightmap { pages: pages(), encoding: Encoding::Linear, exposure: 0.5 };
     let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &style).unwrap());
@@ -256,8 +258,17 @@ fn a_lightmap_goes_onto_a_copy_of_the_material_in_the_next_free_set() {
     let texture = &json["textures"][light["index"].as_u64().unwrap() as usize];
     assert_eq!(texture["extras"]["encoding"], "linear");
     assert_eq!(texture["extras"]["scale"], 200.0);
-    assert_eq!(json["materials"].as_array().unwrap().len(), 2);
+    let names =
+        |json: &Value| json["materials"].as_array().unwrap().iter().map(|m| m["name"].clone()).collect::<Vec<_>>();
+    assert_eq!(names(json), ["paint", "unused"]);
+    assert!(json["materials"][1].get("extensions").is_none());
+
+    // It goes onto a copy where something without light uses the original too.
+    let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit[1..], &style).unwrap());
+    let json = &after.document.as_ref().unwrap().json;
+    assert_eq!(names(json), ["paint", "unused", "paint"]);
     assert!(json["materials"][0].get("extensions").is_none());
+    assert!(json["materials"][2]["extensions"]["MOZ_lightmap"].is_object());
 }
 
 #[test]
@@ -307,6 +318,11 @@ fn unlit_colours_are_exposed_luminance_and_lamps_shine() {
         let color = primitive["attributes"]["COLOR_0"].as_u64().unwrap() as usize;
         (document.read_colors(color).unwrap()[0], factor)
     };
+    assert_eq!(
+        document.json["materials"].as_array().unwrap().len(),
+        2,
+        "of our own materials, those in use are written"
+    );
     // The wall: E/π = 1 cd/m² times the albedo and the exposure.
     let (wall, factor) = color(0);
     assert!((wall[0] - 0.005).abs() < 1e-6 && factor == 1.0, "{wall:?}");
