@@ -2,7 +2,7 @@
 
 use super::{Shared, corner, edge_corner, edge_key, edge_of, for_each_cell, lattice, shared_corner, sides};
 use glam::DVec3;
-use radiosity_scene::{Bands, Elements, Mesh, Side};
+use radiosity_scene::{Bands, Elements, Mesh};
 use rustc_hash::FxHashMap;
 
 /// How far corners are moved towards what keeps the means of the cells where all cells lie to one side, as on the border of
