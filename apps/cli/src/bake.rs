@@ -73,6 +73,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
     progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
+    outputs.spare(&input.files)?;
     arguments.solve.refuse_tiny_elements(&input.mesh)?;
     if let Some(density) = arguments.texels_per_metre {
         arguments.solve.refuse_tiny_texels(&input.mesh, density)?;

@@ -207,6 +207,8 @@ pub struct Input {
     pub faults: Faults,
     /// The glTF it came from.
     pub document: Option<Document>,
+    /// The files beside it that belong to it.
+    pub files: Vec<PathBuf>,
     /// What to call it.
     pub title: String,
 }
@@ -228,8 +230,8 @@ pub fn load(arguments: &SceneArguments, global: &Global, progress: &Progress) ->
 /// The same without telling anybody.
 pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
     arguments.refuse_what_has_no_effect()?;
-    let (mut scene, mut faults, document, title) = match &arguments.scene {
-        None => (radiosity::cornell_box(), Faults::default(), None, "built-in Cornell box".to_owned()),
+    let (mut scene, mut faults, document, files, title) = match &arguments.scene {
+        None => (radiosity::cornell_box(), Faults::default(), None, Vec::new(), "built-in Cornell box".to_owned()),
         Some(path) => {
             let options = LoadOptions {
                 metres_per_unit: arguments.unit.unwrap_or(1.0),
@@ -238,7 +240,7 @@ pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
                 ..LoadOptions::default()
             };
             let loaded = radiosity::io::load(path, &options)?;
-            (loaded.scene, loaded.faults, loaded.document, path.display().to_string())
+            (loaded.scene, loaded.faults, loaded.document, loaded.files, path.display().to_string())
         }
     };
     if let Some(sky) = &arguments.sky {
@@ -246,7 +248,7 @@ pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
     }
     let mesh = Mesh::new(&scene);
     faults::find(&scene, &mesh, &title, &mut faults);
-    Ok(Input { scene, mesh, faults, document, title })
+    Ok(Input { scene, mesh, faults, document, files, title })
 }
 
 fn set_sky(scene: &mut Scene, text: &str) -> Result<(), Failure> {

@@ -46,6 +46,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let read = radiosity::io::read_points_csv(&arguments.points)?;
     let points = &read.points;
     let input = input::load(&arguments.scene, global, progress)?;
+    outputs.spare(&input.files)?;
     arguments.solve.refuse_tiny_elements(&input.mesh)?;
     let tracer = Tracer::new(&input.scene, &input.mesh);
     let places: Vec<_> = points.iter().map(|p| (p.position, p.normal)).collect();

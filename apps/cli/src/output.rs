@@ -44,6 +44,9 @@ pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
+/// Why a file is not to be written.
+const READ: &str = "is read by this run and would be replaced; choose another name";
+
 /// The files of one run.
 pub struct Outputs {
     inputs: Vec<PathBuf>,
@@ -82,7 +85,7 @@ impl Outputs {
             Err(error) => return refuse(error.to_string()),
         };
         if self.inputs.contains(&place) {
-            return refuse("is read by this run and would be replaced; choose another name".to_owned());
+            return refuse(READ.to_owned());
         }
         if self.promised.contains(&place) {
             return refuse("two outputs have this name".to_owned());
@@ -96,6 +99,17 @@ impl Outputs {
         }
         self.promised.push(place);
         Ok(())
+    }
+
+    /// Refuses what would replace one of these files, which the run reads as well.
+    pub fn spare(&mut self, files: &[PathBuf]) -> Result<(), Failure> {
+        match self.promised.iter().find(|place| files.contains(place)) {
+            Some(place) => Err(Failure::input(format!("{}: {READ}", place.display()))),
+            None => {
+                self.inputs.extend_from_slice(files);
+                Ok(())
+            }
+        }
     }
 
     /// Writes bytes beside their place.

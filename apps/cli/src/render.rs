@@ -29,6 +29,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.promise(&arguments.output, &["png", "exr"])?;
     progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
+    outputs.spare(&input.files)?;
     arguments.solve.refuse_tiny_elements(&input.mesh)?;
     let tracer = Tracer::new(&input.scene, &input.mesh);
     arguments.picture.warn_of_what_has_no_effect(true, !views::is_exr(&arguments.output), progress);

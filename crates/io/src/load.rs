@@ -4,7 +4,7 @@ use crate::source::read_plain_file;
 use crate::{Document, Folder, LoadError, LoadOptions, gltf, obj};
 use radiosity_scene::{Fault, Faults, Mesh, Scene, counted};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most faults that are kept of one file; a damaged one can have millions, and nobody reads past the first hundreds.
 const MAX_FAULTS: usize = 1000;
@@ -18,6 +18,8 @@ pub struct Loaded {
     pub faults: Faults,
     /// The glTF as it stood, for writing it back lit; `None` for other formats.
     pub document: Option<Document>,
+    /// The files beside the scene that it was read from, by their places.
+    pub files: Vec<PathBuf>,
 }
 
 impl Loaded {
@@ -38,7 +40,11 @@ impl Loaded {
             let what = format!("and {} more", more.len());
             faults.0.push(Fault { severity: more[0].severity, place: file.to_owned(), what, hint: String::new() });
         }
-        if faults.has_errors() { Err(LoadError::Faults(faults)) } else { Ok(Loaded { scene, faults, document }) }
+        if faults.has_errors() {
+            Err(LoadError::Faults(faults))
+        } else {
+            Ok(Loaded { scene, faults, document, files: Vec::new() })
+        }
     }
 }
 
@@ -74,11 +80,13 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let mut loaded = match extension.as_str() {
         "glb" | "gltf" => {
             let (bytes, folder) = read()?;
-            gltf::load(&file, &bytes, &folder, options)?
+            let loaded = gltf::load(&file, &bytes, &folder, options)?;
+            Loaded { files: folder.into_files(), ..loaded }
         }
         "obj" => {
             let (bytes, folder) = read()?;
-            obj::load(&file, &bytes, &folder, options)?
+            let loaded = obj::load(&file, &bytes, &folder, options)?;
+            Loaded { files: folder.into_files(), ..loaded }
         }
         _ => {
             let what = format!("'.{extension}' is no known kind of scene");

@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Largest file that is read into memory. A GLB cannot be longer (its length has 32 bits), and half of it would
 /// already refuse scans that people have.
@@ -62,16 +63,22 @@ impl SourceError {
 }
 
 /// A folder on disk; reads below it, nowhere else.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Folder {
     root: PathBuf,
+    files: Mutex<Vec<PathBuf>>,
 }
 
 impl Folder {
     /// The folder that holds `input`.
     pub fn of(input: &Path) -> std::io::Result<Folder> {
         let parent = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Ok(Folder { root: parent.canonicalize()? })
+        Ok(Folder { root: parent.canonicalize()?, files: Mutex::default() })
+    }
+
+    /// The files that were read.
+    pub fn into_files(self) -> Vec<PathBuf> {
+        self.files.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -86,10 +93,12 @@ impl Source for Folder {
         if !path.starts_with(&self.root) {
             return Err(SourceError::Outside(uri.to_owned()));
         }
-        read_plain_file(&path).map_err(|error| match error.kind() {
+        let bytes = read_plain_file(&path).map_err(|error| match error.kind() {
             std::io::ErrorKind::FileTooLarge => SourceError::TooLarge(uri.to_owned()),
             _ => unreadable(error),
-        })
+        })?;
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).push(path);
+        Ok(bytes)
     }
 }
 
