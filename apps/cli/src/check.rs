@@ -5,7 +5,7 @@ use crate::numbers::fixed;
 use crate::output::print;
 use crate::{Failure, Global, faults};
 use clap::Args;
-use radiosity::{Fault, Faults, PointLightKind, Severity, counted};
+use radiosity::{PointLightKind, Severity, counted};
 use serde_json::{Value, json};
 
 /// Arguments of `check`.
@@ -19,20 +19,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<(), Failure> {
     let input = input::read(&arguments.scene)?;
     if global.json {
-        print(&describe(&input).to_string())?
+        print(&describe(&input).to_string())
     } else if global.quiet {
         let warnings = input.faults.0.iter().filter(|fault| fault.severity == Severity::Warning);
-        warnings.map(ToString::to_string).try_for_each(|warning| print(&warning))?
+        warnings.map(ToString::to_string).try_for_each(|warning| print(&warning))
     } else {
-        print(&summary(&input))?
+        print(&summary(&input))
     }
-    // Errors go where those of scenes that cannot be read go.
-    let errors: Vec<Fault> = input.faults.0.into_iter().filter(is_error).collect();
-    if errors.is_empty() { Ok(()) } else { Err(Faults(errors).into()) }
-}
-
-fn is_error(fault: &Fault) -> bool {
-    fault.severity == Severity::Error
 }
 
 fn area(input: &Input) -> f64 {
@@ -66,7 +59,7 @@ fn summary(input: &Input) -> String {
     lines.push(format!("  {}, {emitting} of them luminous", count(scene.materials.len(), "material")));
     let (lights, cameras) = (count(scene.lights.len(), "light"), count(scene.cameras.len(), "camera"));
     lines.push(format!("  {lights} without area, {cameras}"));
-    lines.extend(input.faults.0.iter().filter(|fault| !is_error(fault)).map(ToString::to_string));
+    lines.extend(input.faults.0.iter().map(ToString::to_string));
     if input.faults.0.is_empty() {
         lines.push("  no faults".to_owned());
     }

@@ -203,7 +203,7 @@ pub struct Input {
     pub scene: Scene,
     /// Its welded triangles.
     pub mesh: Mesh,
-    /// What is wrong with it; with errors it can be described and not lit.
+    /// Warnings and notes.
     pub faults: Faults,
     /// The glTF it came from.
     pub document: Option<Document>,
@@ -216,9 +216,6 @@ pub struct Input {
 /// Reads the scene and its sky; all faults at once.
 pub fn load(arguments: &SceneArguments, global: &Global, progress: &Progress) -> Result<Input, Failure> {
     let input = read(arguments)?;
-    if input.faults.has_errors() {
-        return Err(input.faults.into());
-    }
     for fault in &input.faults.0 {
         if fault.severity > Severity::Note || global.verbose {
             progress.say(&fault.to_string());

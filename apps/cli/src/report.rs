@@ -127,6 +127,9 @@ impl ErrorReport {
 
     /// In a line.
     pub fn line(&self) -> String {
+        if self.points > 0 && self.mean_illuminance == 0.0 && self.estimated == 0.0 {
+            return "there is no light: all is black".to_owned();
+        }
         let percent = |x: f64| format!("{:.3} %", 100.0 * x);
         let verdict = if self.achieved { "reached" } else { "NOT reached" };
         let bound = match self.upper_95_one_sided {

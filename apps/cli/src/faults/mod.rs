@@ -11,7 +11,7 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
     if is_dark(scene) {
         let hint =
             "give it a sky, --sky overcast:10000, faces an emissive material, or lamps, KHR_lights_punctual in glTF";
-        faults.error(title, "there is no light", hint);
+        faults.warning(title, "there is no light, and all will be black", hint);
     }
     let open = open_edges(mesh);
     if open > 0 {
