@@ -211,8 +211,8 @@ pub(crate) fn most_paths(error: f64) -> u32 {
 /// says of a few places may be wrong by more than its own scatter tells.
 const SURE: u32 = 1 << 16;
 
-/// Has the auditor `judge` an answer, spending the referee's paths while the target lies between the two bounds, or above
-/// them too early: taking an estimate for the truth would refine for the noise of the referee.
+/// Has the auditor `judge` an answer, spending the referee's paths until the answer meets the target or misses it for certain:
+/// taking an estimate for the truth would refine for the noise of the referee.
 pub(crate) fn certify(
     auditor: &mut Auditor,
     judge: impl Fn(&Auditor) -> Audit,
@@ -229,7 +229,7 @@ pub(crate) fn certify(
         let least = SURE.div_ceil(total.max(1) as u32);
         loop {
             let audit = judge(auditor);
-            let unsure = audit.lower <= target || auditor.paths() < least;
+            let unsure = !audit.is_above(target) || auditor.paths() < least;
             let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths;
             if !open {
                 return Ok(audit);

@@ -1,7 +1,10 @@
 //! Facets that stand for a curved surface receive light as the surface would.
 
 use glam::{DVec2, DVec3};
-use radiosity::{Material, Mesh, Scene, Side, Sky, Solution, SolveOptions, Tracer, Up};
+use radiosity::answer::Station;
+use radiosity::stations::station;
+use radiosity::transport::Shadowing;
+use radiosity::{Indirect, Material, Mesh, Scene, Side, Sky, Solution, SolveOptions, Tracer, Up};
 use std::f64::consts::{PI, TAU};
 
 const FACETS: usize = 16;
@@ -30,6 +33,34 @@ fn under_the_sky(angle: f64) -> f64 {
     let zenith = 9.0 * 1000.0 / (7.0 * PI);
     let (sin, cos) = angle.sin_cos();
     zenith / 3.0 * (0.5 * PI * (1.0 + cos) + 4.0 / 3.0 * ((PI - angle) * cos + sin))
+}
+
+/// Directions about the round one's normal that leave through the facet itself see no sky.
+#[test]
+fn no_light_comes_into_a_closed_solid() {
+    let mut scene = cylinder();
+    scene.materials[0].double_sided = true;
+    let caps: Vec<[DVec3; 3]> = scene
+        .positions
+        .chunks_exact(6)
+        .flat_map(|facet| {
+            // The facet's corners are a, b, c and a, c, d, with a and d on one end.
+            let [a, b, c, d] = [facet[0], facet[1], facet[2], facet[5]];
+            [[DVec3::new(0.0, a.y, 0.0), a, d], [DVec3::new(0.0, b.y, 0.0), c, b]]
+        })
+        .collect();
+    scene.add_triangles("caps", 0, &caps);
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let solution = Solution::new(&tracer, &SolveOptions::default(), &()).unwrap();
+    for (side, is_lit) in [(Side::Front, true), (Side::Back, false)] {
+        let at = |t: usize| station(&tracer, t, DVec2::splat(0.1), side);
+        let stations: Vec<Station> = (0..2 * FACETS).map(at).collect();
+        let gather = Indirect::Gather { rays: 256 };
+        let light = solution.at(&stations, gather, &Shadowing { places: 1, rays: 1 }, &()).unwrap().irradiance;
+        let sum: f64 = light.iter().map(|e| f64::from(e[1])).sum();
+        assert!(if is_lit { sum > 1000.0 } else { sum == 0.0 }, "{side:?}: {sum} lx");
+    }
 }
 
 #[test]

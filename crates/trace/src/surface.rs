@@ -60,6 +60,8 @@ pub struct Tracer<'a> {
     offset: f64,
     /// Per triangle, whether it is more than an opaque one-sided surface.
     kind: Vec<Kind>,
+    /// Unit normals of the triangles' fronts.
+    normals: Vec<Vec3>,
     all_opaque: bool,
 }
 
@@ -108,6 +110,7 @@ impl<'a> Tracer<'a> {
             offset: half * 2f64.powi(-21),
             all_opaque: kind.iter().all(|k| !k.see_through),
             kind,
+            normals: (0..mesh.triangles.len()).map(|t| mesh.normal(t).as_vec3()).collect(),
         }
     }
 
@@ -126,11 +129,17 @@ impl<'a> Tracer<'a> {
         self.offset
     }
 
-    /// The ray that leaves a place in a direction and ends after `length` metres.
+    /// The ray that leaves a place in a direction and ends after `length` metres. It does not meet the triangle of the place,
+    /// unless it goes through it: a normal that is not the triangle's has directions that do, and whoever is inside of a
+    /// smooth solid sees nothing outside.
     #[inline]
     pub fn ray(&self, from: &Place, direction: DVec3, length: f64) -> Ray {
         let origin = from.point - self.centre + self.offset * from.normal;
-        Ray { origin: origin.as_vec3(), direction: direction.as_vec3(), t_max: length as f32, skip: from.triangle }
+        let (normal, direction) = (from.normal.as_vec3(), direction.as_vec3());
+        let goes_through = |flat: &Vec3| flat.dot(normal) * flat.dot(direction) < 0.0;
+        let skip =
+            if self.normals.get(from.triangle as usize).is_some_and(goes_through) { u32::MAX } else { from.triangle };
+        Ray { origin: origin.as_vec3(), direction, t_max: length as f32, skip }
     }
 
     /// A ray that does not start on a surface: a camera's.

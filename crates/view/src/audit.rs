@@ -18,6 +18,9 @@ use serde::Serialize;
 /// Standard normal quantile of the one-sided 95 % bound.
 const ONE_SIDED_95: f64 = 1.645;
 
+/// Standard errors beyond which an answer is wrong for certain.
+const CERTAIN: f64 = 3.0;
+
 /// Fewer points than this get no bound: the spread of heavy-tailed products cannot be told from a handful.
 pub const FEWEST_POINTS: usize = 30;
 
@@ -43,6 +46,16 @@ pub struct Audit {
     pub mean_illuminance: f64,
     /// Further places at which what is handed out was compared with the answer that it was read from.
     pub compared: usize,
+}
+
+impl Audit {
+    /// Whether the error is larger than `target` beyond doubt: by three standard errors of its square. A few bright paths of
+    /// the referee raise the estimate and its standard error alike, and never come to more than one or two.
+    pub fn is_above(&self, target: f64) -> bool {
+        let square = |x: f64| x * x;
+        let deviation = (square(self.upper) - square(self.error)) / ONE_SIDED_95;
+        square(self.error) - CERTAIN * deviation > square(target)
+    }
 }
 
 /// Referee estimates at a fixed set of points, kept and refined while answers come and go. Judging several answers by
@@ -176,5 +189,23 @@ fn judge(sums: &[[f64; 2]], m: &[Bands], from: Option<(&[Bands], &[f64])>, paths
         bias_error: deviation(&shift, bias) / level.max(f64::MIN_POSITIVE),
         mean_illuminance: level,
         compared: squares.len(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few bright paths of the referee are no proof that an answer is wrong; that all places say so is.
+    #[test]
+    fn few_bright_paths_prove_no_error() {
+        let audit = |h: f32, bright: usize| {
+            let sums: Vec<[f64; 2]> = (0..500).map(|i| if i < bright { [1.6, 1.6] } else { [1.0, 1.0] }).collect();
+            judge(&sums, &vec![[h; 3]; 500], None, 1)
+        };
+        let lucky = audit(1.0, 2);
+        assert!(lucky.error > 0.03 && !lucky.is_above(0.01), "{lucky:?}");
+        let wrong = audit(1.03, 0);
+        assert!((wrong.error - 0.03).abs() < 1e-6 && wrong.is_above(0.01), "{wrong:?}");
     }
 }
