@@ -141,6 +141,11 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let files = std::iter::once(target.as_path()).chain(pages.iter().map(PathBuf::as_path)).chain(written);
     let files: Vec<&Path> = files.chain(arguments.report.iter().map(PathBuf::as_path)).collect();
 
+    if !input.scene.sky.is_black() && baked.solution.balance().from_sky.iter().all(|flux| *flux == 0.0) {
+        progress.say(
+            "warning: no light of the sky reaches any surface; the model has no opening, or faces look the wrong way",
+        );
+    }
     let written = (&audit, rounds, lightmap);
     let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref()), written, &files, progress);
     for path in &arguments.report {
@@ -215,7 +220,7 @@ fn tell(report: &Report, global: &Global, progress: &Progress) -> Result<(), Fai
     let (solution, light) = (&report.solution, &report.illuminance);
     let memory = report.peak_memory_mb.map_or(String::new(), |mb| format!(", {mb:.0} MB"));
     progress.say(&format!(
-        "{} elements in {} cells x {} rays, {:.1} s{memory}; mean illuminance {:.4} lx, 95 % of the lit area above {:.4}, brightest {:.4}",
+        "{} elements in {} cells x {} rays, {:.1} s{memory}; illuminance of the lit area: mean {:.4} lx, 95 % of it above {:.4}, brightest {:.4}",
         solution.elements,
         solution.cells,
         solution.rays_per_cell,

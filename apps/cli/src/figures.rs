@@ -10,8 +10,8 @@ pub const BIAS: &str = "mean difference over mean illuminance";
 
 pub const LOW: &str =
     "95 % of the area that any light reaches gets more; the rest are corners, cracks, places behind things";
-pub const MEAN: &str = "by area, over all exposed surfaces";
-pub const MEDIAN: &str = "half of the area gets more";
+pub const MEAN: &str = "by area, over all that any light reaches";
+pub const MEDIAN: &str = "half of the lit area gets more";
 pub const LARGEST: &str = "the brightest element";
 pub const UNIFORMITY: &str =
     "low over mean, of all surfaces; not the least over mean of a task area, for which there is `measure`";

@@ -44,15 +44,18 @@ const INFERNO: [[u8; 3]; 10] = [
     [252, 255, 164],
 ];
 
-/// Illuminance of all exposed surfaces, by elements.
+/// Illuminance of all exposed surfaces that any light reaches, by elements. Insides of closed solids whose faces are two-sided
+/// are black and no part of the room.
 #[derive(Clone, Debug, Serialize)]
 pub struct Illuminance {
-    /// 95 % of the area that any light reaches gets more, lx.
+    /// 95 % of the lit area gets more, lx.
     pub low: f64,
-    /// Mean by area, lx.
+    /// Mean over the lit area, lx.
     pub mean: f64,
-    /// Half of the area gets more, lx.
+    /// Half of the lit area gets more, lx.
     pub median: f64,
+    /// Share of the exposed area that no light reaches.
+    pub dark: f64,
     /// The brightest element, lx.
     pub largest: f64,
     /// Classes, upwards; none if everything is dark. The first holds all below it as well, the last all above.
@@ -70,7 +73,7 @@ pub struct Class {
     pub from: f64,
     /// Upper edge, lx.
     pub to: f64,
-    /// Share of the exposed area.
+    /// Share of the lit area.
     pub share: f64,
     /// Its colour, sRGB.
     pub color: [u8; 3],
@@ -83,33 +86,30 @@ pub struct SurfaceLight {
     pub name: String,
     /// Exposed area, m².
     pub area: f64,
-    /// 95 % of the area that any light reaches gets more, lx.
+    /// 95 % of its lit area gets more, lx.
     pub low: f64,
-    /// Mean by area, lx.
+    /// Mean over its lit area, lx.
     pub mean: f64,
     /// The brightest element, lx.
     pub largest: f64,
 }
 
-/// Illuminance and area of elements, in ascending order.
+/// Illuminance and area of the elements that any light reaches, in ascending order.
 struct Sorted(Vec<(f64, f64)>);
 
 impl Sorted {
     fn new(mut elements: Vec<(f64, f64)>) -> Sorted {
+        elements.retain(|(lux, _)| *lux > 0.0);
         elements.sort_by(|a, b| a.0.total_cmp(&b.0));
         Sorted(elements)
     }
 
-    fn area(&self) -> f64 {
-        self.0.iter().map(|(_, area)| area).sum()
-    }
-
     fn mean(&self) -> f64 {
-        self.0.iter().map(|(lux, area)| lux * area).sum::<f64>() / self.area().max(f64::MIN_POSITIVE)
+        self.0.iter().map(|(lux, area)| lux * area).sum::<f64>() / total_area(&self.0).max(f64::MIN_POSITIVE)
     }
 
     fn low(&self) -> f64 {
-        quantile(self.above(0.0), DARKEST)
+        quantile(&self.0, DARKEST)
     }
 
     fn largest(&self) -> f64 {
@@ -141,13 +141,11 @@ impl Illuminance {
         }
         let mut surfaces: Vec<SurfaceLight> = surfaces
             .into_iter()
-            .map(|(name, elements)| (name.to_owned(), Sorted::new(elements)))
-            .map(|(name, all)| SurfaceLight {
-                name,
-                area: all.area(),
-                low: all.low(),
-                mean: all.mean(),
-                largest: all.largest(),
+            .map(|(name, elements)| {
+                let area = total_area(&elements);
+                let lit = Sorted::new(elements);
+                let (low, mean, largest) = (lit.low(), lit.mean(), lit.largest());
+                SurfaceLight { name: name.to_owned(), area, low, mean, largest }
             })
             .collect();
         surfaces.sort_by(|a, b| b.area.total_cmp(&a.area));
@@ -160,23 +158,25 @@ impl Illuminance {
 
     /// Of elements and of what is shown of them: illuminance and area.
     fn of(elements: Vec<(f64, f64)>, shown: Vec<(f64, f64)>) -> Illuminance {
+        let exposed = total_area(&elements);
         let (all, shown) = (Sorted::new(elements), Sorted::new(shown));
+        let lit = total_area(&all.0);
         let scaled = if shown.0.is_empty() { &all } else { &shown };
-        let high = quantile(scaled.above(0.0), 1.0 - TAIL);
+        let high = quantile(&scaled.0, 1.0 - TAIL);
         let low = quantile(scaled.above(high / RANGE), TAIL);
         let mut light = Illuminance {
             low: all.low(),
             mean: all.mean(),
             median: quantile(&all.0, 0.5),
+            dark: if exposed > 0.0 { 1.0 - lit / exposed } else { 0.0 },
             largest: all.largest(),
             classes: classes(low, high),
             surfaces: Vec::new(),
             further_surfaces: 0,
         };
-        let area = all.area();
         for (lux, part) in all.0 {
             if let Some(class) = light.class(lux) {
-                light.classes[class].share += part / area;
+                light.classes[class].share += part / lit;
             }
         }
         light
@@ -187,6 +187,10 @@ impl Illuminance {
         let last = self.classes.len().checked_sub(1)?;
         (!lux.is_nan()).then(|| self.classes.partition_point(|class| class.to <= lux).min(last))
     }
+}
+
+fn total_area(elements: &[(f64, f64)]) -> f64 {
+    elements.iter().map(|(_, area)| area).sum()
 }
 
 /// The value that a share of the area stays below, of elements in ascending order; zero of none.

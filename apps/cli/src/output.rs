@@ -45,7 +45,7 @@ pub fn complain(line: &str) {
 }
 
 /// Why a file is not to be written.
-const READ: &str = "is read by this run and would be replaced; choose another name";
+const READ: &str = "is read by this run, or belongs to the scene, and would be replaced; choose another name";
 
 /// The files of one run.
 pub struct Outputs {
@@ -101,7 +101,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Refuses what would replace one of these files, which the run reads as well.
+    /// Refuses what would replace one of these files, which belong to the scene.
     pub fn spare(&mut self, files: &[PathBuf]) -> Result<(), Failure> {
         match self.promised.iter().find(|place| files.contains(place)) {
             Some(place) => Err(Failure::input(format!("{}: {READ}", place.display()))),

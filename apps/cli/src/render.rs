@@ -47,7 +47,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
     outputs.commit()?;
 
-    let error = ErrorReport::new(&audit, &audit, &arguments.solve);
+    let error = ErrorReport::new(&audit, &baked.audit, &arguments.solve);
     if global.json {
         let result = serde_json::json!({
             "event": "result", "error": error, "output": arguments.output, "width": width, "height": height,

@@ -127,7 +127,10 @@ impl ErrorReport {
 
     /// In a line.
     pub fn line(&self) -> String {
-        if self.points > 0 && self.mean_illuminance == 0.0 && self.estimated == 0.0 {
+        if self.points == 0 {
+            return "nothing to audit: there is no surface".to_owned();
+        }
+        if self.mean_illuminance == 0.0 && self.estimated == 0.0 {
             return "there is no light: all is black".to_owned();
         }
         let percent = |x: f64| format!("{:.3} %", 100.0 * x);
@@ -136,7 +139,7 @@ impl ErrorReport {
             upper if upper.is_finite() => format!("at most {} with 95 % confidence", percent(upper)),
             _ => "without a bound, since the audit had too few points".to_owned(),
         };
-        if self.points > 0 && self.estimated.is_infinite() {
+        if self.estimated.is_infinite() {
             let asked = percent(self.asked);
             return format!(
                 "error asked {asked}: NOT reached; the audit finds no light at all, but the answer has some"
@@ -146,7 +149,10 @@ impl ErrorReport {
             format!("error asked {}: {verdict}; audit says {}, {bound}", percent(self.asked), percent(self.estimated));
         if self.is_lost_in_writing() {
             let within = percent(self.solution_upper_95_one_sided);
-            line += &format!("; the solution itself is within {within}: {}", self.finer);
+            line += &format!("; the solution itself is within {within}");
+            if !self.finer.is_empty() {
+                line += &format!(": {}", self.finer);
+            }
         }
         line
     }

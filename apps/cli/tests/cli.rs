@@ -209,15 +209,18 @@ fn outputs_that_cannot_be_written_are_refused_before_the_work() {
 fn files_that_a_scene_refers_to_are_not_replaced() {
     let room = Room::new("spared");
     room.write("one.obj", "mtllib one.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
-    room.write("one.mtl", "newmtl a\nmap_Kd wood.png\n");
+    room.write("one.mtl", "newmtl a\nmap_Kd wood.png\nmap_Bump -bm 0.5 bump.png\n");
+    room.write("bump.png", "is not read");
     fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/images/cornell.png"), room.0.join("wood.png")).unwrap();
     let before = fs::read(room.0.join("wood.png")).unwrap();
     for call in ["render one.obj --sky uniform:1 -o wood.png", "bake one.obj --sky uniform:1 --image ./wood.png"] {
         let run = room.run(call.split(' '));
         assert!(run.code == Some(2) && run.err.contains("wood.png: is read by this run"), "{call}: {run:?}");
     }
+    let run = room.run("render one.obj --sky uniform:1 -o bump.png".split(' '));
+    assert!(run.code == Some(2) && run.err.contains("bump.png: is read by this run"), "{run:?}");
     assert!(fs::read(room.0.join("wood.png")).unwrap() == before);
-    assert_eq!(room.names(), ["one.mtl", "one.obj", "wood.png"]);
+    assert_eq!(room.names(), ["bump.png", "one.mtl", "one.obj", "wood.png"]);
 }
 
 #[test]

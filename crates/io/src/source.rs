@@ -17,6 +17,9 @@ const MAX_FILE_BYTES: u64 = 1 << 32;
 pub trait Source {
     /// The bytes behind an address as the file writes it (percent-encoded, relative).
     fn read(&self, uri: &str) -> Result<Vec<u8>, SourceError>;
+
+    /// Takes note of an address that is not read: what is there belongs to the scene all the same.
+    fn mention(&self, _uri: &str) {}
 }
 
 /// Why an address gave no bytes.
@@ -76,7 +79,7 @@ impl Folder {
         Ok(Folder { root: parent.canonicalize()?, files: Mutex::default() })
     }
 
-    /// The files that were read.
+    /// The files that were named, by their places.
     pub fn into_files(self) -> Vec<PathBuf> {
         self.files.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
@@ -93,12 +96,17 @@ impl Source for Folder {
         if !path.starts_with(&self.root) {
             return Err(SourceError::Outside(uri.to_owned()));
         }
-        let bytes = read_plain_file(&path).map_err(|error| match error.kind() {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).push(path.clone());
+        read_plain_file(&path).map_err(|error| match error.kind() {
             std::io::ErrorKind::FileTooLarge => SourceError::TooLarge(uri.to_owned()),
             _ => unreadable(error),
-        })?;
-        self.files.lock().unwrap_or_else(PoisonError::into_inner).push(path);
-        Ok(bytes)
+        })
+    }
+
+    fn mention(&self, uri: &str) {
+        if let Some(path) = relative_path(uri).ok().and_then(|relative| self.root.join(relative).canonicalize().ok()) {
+            self.files.lock().unwrap_or_else(PoisonError::into_inner).push(path);
+        }
     }
 }
 

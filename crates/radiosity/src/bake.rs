@@ -1,6 +1,7 @@
 //! From a scene to a solution whose error is known: refine until the audit is content.
 
-use crate::answer::{SMOOTHING, Station};
+use crate::answer::Station;
+use crate::field::SMOOTHING;
 use crate::measure::{Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages};
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
@@ -45,7 +46,9 @@ impl Default for BakeOptions {
 pub struct Baked<'a> {
     /// The solution.
     pub solution: Solution<'a>,
-    /// Its continuous indirect field.
+    /// Its indirect light by element, by halves of its rays.
+    pub(crate) received: Vec<[Bands; 2]>,
+    /// The continuous field of it.
     pub field: Field,
     /// Rays that gather the indirect light at each point; 0 where the field is good enough.
     pub gather: usize,
@@ -78,6 +81,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut solve = options.solve;
     solve.cells = solve.cells.max(CELLS);
     solve.rays = solve.rays.max(rays_for(options.error, 512.0, 32, 2048));
+    solve.fit(tracer);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
     monitor.round(1, options.rounds + 1);
     let mut solution = Solution::new(tracer, &solve, monitor)?;
@@ -86,7 +90,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut auditor = Auditor::new(tracer, watched.iter().map(|s| s.place).collect(), options.seed);
     let mut rounds = Vec::new();
     loop {
-        let field = solution.indirect_field(monitor)?;
+        let received = solution.received(monitor)?;
+        let field = solution.field_of(&received);
         let answer = solution.at(&watched, Indirect::Field(&field), &shadowing, monitor)?;
         let mut light = answer.irradiance;
         let judge = |auditor: &mut Auditor, light: &[Bands]| {
@@ -126,6 +131,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             stages.absorb(&solution.stages);
             return Ok(Baked {
                 solution,
+                received,
                 field,
                 gather,
                 shadowing,

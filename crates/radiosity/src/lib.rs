@@ -20,6 +20,7 @@ mod cornell;
 mod division;
 mod error;
 mod faces;
+mod field;
 mod judge;
 mod lightmap;
 pub mod measure;

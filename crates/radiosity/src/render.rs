@@ -6,6 +6,7 @@ use crate::monitor::Monitor;
 use crate::{Baked, Error, Indirect};
 use radiosity_scene::{Bands, Camera, luminance};
 use radiosity_trace::Place;
+use radiosity_trace::sampling::{hash, unit};
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor, Picture, ViewRays};
 
@@ -16,7 +17,7 @@ pub struct RenderOptions {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Shadow rays per pixel, over all lights.
+    /// Shadow rays per pixel, over all lights; with 128 walls near a lamp are sandy.
     pub shadowing: Shadowing,
 }
 
@@ -50,7 +51,8 @@ impl View {
     }
 }
 
-/// Looks at a solution, less noisy where it is looked at than the error that it was made for.
+/// Looks at a solution. Cells that are seen gather their indirect light until its noise is below the error that the solution was
+/// made for, as far as some thousands of rays bring it.
 ///
 /// # Errors
 /// [`Error::Stopped`].
@@ -66,7 +68,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
             looks[solution.elements.cell(element)] += 1;
         }
     }
-    let field = solution.indirect_field_on(&looks, baked.error, monitor)?;
+    let field = solution.field_on(&looks, baked.received.clone(), baked.error, monitor)?;
     let answer = solution.at(&stations, Indirect::Field(&field), &options.shadowing, monitor)?;
     let pixels = view.own.len();
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
@@ -76,8 +78,12 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
             (share[pixel], illuminance[pixel]) = (response, luminance(*e));
         }
     }
-    let stride = stations.len().div_ceil(baked.watched.len().max(1)).max(1);
-    let seen = stations.iter().map(|station| station.place).zip(answer.irradiance.iter().copied());
-    let watched = seen.skip(stride / 2).step_by(stride).collect();
+    // One of each of as many runs of places; at equal steps they might all lie in one column.
+    let count = baked.watched.len().min(stations.len());
+    let pick = |i: usize| {
+        let jitter = f64::from(unit(hash(baked.seed ^ hash(i as u32))));
+        ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
+    };
+    let watched = (0..count).map(pick).map(|i| (stations[i].place, answer.irradiance[i])).collect();
     Ok(View { picture: view.picture(&answer.irradiance), illuminance, watched })
 }

@@ -6,7 +6,7 @@
 use crate::Error;
 use crate::division::{Optics, divided};
 use crate::monitor::{Monitor, Stages, Watch};
-use radiosity_scene::{Bands, Elements, SkyPatches, luminance};
+use radiosity_scene::{Bands, Elements, SkyPatches};
 use radiosity_solve::{DiffuseResponse, Go, Info, Params, jacobi};
 use radiosity_trace::Tracer;
 use radiosity_transport::{Columns, ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires, Shadowing};
@@ -44,6 +44,18 @@ impl Default for SolveOptions {
             shadowing: Shadowing { places: 8, rays: 2 },
             solver: Params { tolerance: 1e-4, max_steps: 500 },
             memory: 4 << 30,
+        }
+    }
+}
+
+/// Rays per cell below which an answer is of no use.
+const LEAST_RAYS: usize = 32;
+
+impl SolveOptions {
+    /// Fewer rays where the memory does not hold those that are asked for: an error that is missed tells more than none.
+    pub(crate) fn fit(&mut self, tracer: &Tracer) {
+        while self.rays > LEAST_RAYS && Solution::memory(tracer, self) > self.memory {
+            self.rays /= 2;
         }
     }
 }
@@ -353,34 +365,6 @@ impl<'a> Solution<'a> {
     /// Exposed area of each element, m²; zero where it is buried.
     pub fn exposed_area(&self) -> Vec<f64> {
         self.area.iter().enumerate().map(|(e, area)| area * self.exposure.share(e as u32)).collect()
-    }
-
-    /// Relative standard error of the irradiance of cells that comes from the rows' sampling, by the difference of their
-    /// two halves, which makes it 15 to 40 % too large: root mean square over the exposed area, each cell by its own
-    /// irradiance E, as the eye takes it, and by the weight E/(E + mean E), so that neither the dark insides of furniture
-    /// nor a bright garden decide.
-    pub fn row_noise(&self) -> f64 {
-        let halves = self.indirect_halves();
-        let weight = self.exposed_area();
-        let y = |e: usize| f64::from(luminance(self.irradiance[e]));
-        let mean = weight.iter().enumerate().map(|(e, w)| w * y(e)).sum::<f64>()
-            / weight.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let (mut noise, mut sum) = (0.0, 0.0);
-        for cell in 0..self.elements.cells() {
-            let (mut difference, mut flux, mut exposed) = (0.0, 0.0, 0.0);
-            for e in self.elements.of_cell(cell).map(|e| e as usize) {
-                let [a, b] = halves[e].map(|half| f64::from(luminance(half)));
-                difference += weight[e] * 0.5 * (a - b);
-                flux += weight[e] * y(e);
-                exposed += weight[e];
-            }
-            if flux > 0.0 {
-                let counted = exposed * flux / (flux + exposed * mean);
-                noise += counted * (difference / flux).powi(2);
-                sum += counted;
-            }
-        }
-        (noise / sum.max(f64::MIN_POSITIVE)).sqrt()
     }
 
     /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it.

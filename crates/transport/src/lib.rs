@@ -19,7 +19,7 @@ pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;
 pub use gather::Gather;
 pub use luminaires::{Light, Luminaires};
-pub use receivers::{CurvedReceivers, ElementReceivers, PointReceivers, Receivers};
+pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers};
 pub use rows::{HitTable, IdSpace};
 
 /// Tells a long computation's progress and may end it.

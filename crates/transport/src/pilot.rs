@@ -52,7 +52,8 @@ pub(crate) struct Pilot {
 /// What the first rays of one receiver brought.
 #[derive(Clone, Copy, Default)]
 struct Receiver {
-    /// Its triangle and normal: receivers that share them draw the same directions from the same cells.
+    /// Its triangle and normal: receivers that share them draw the same directions from the same cells, or similar ones where
+    /// each place has a normal of its own.
     plane: Option<(u32, DVec3)>,
     rays: u32,
     halves: [[f64; 3]; 2],

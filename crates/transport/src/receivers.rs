@@ -26,7 +26,7 @@ pub struct Site {
     /// Unit normal.
     pub normal: DVec3,
     /// Where it receives with other normals than its own: that at the origin, and by how much it changes along the edges.
-    curved: Option<[DVec3; 3]>,
+    normals: Option<[DVec3; 3]>,
     triangle: u32,
     mask: u64,
 }
@@ -44,7 +44,7 @@ impl Site {
             origin: a + inset * ((a + b + c) / 3.0 - a),
             edges: [b - a, c - a].map(|edge| (1.0 - inset) * edge),
             normal: elements.normal(mesh, element),
-            curved: None,
+            normals: None,
             triangle: triangle as u32,
             mask,
         }
@@ -61,7 +61,7 @@ impl Site {
         let (x, y) = open_place(self.mask, x, y);
         let (u, v) = triangle_from_square(x, y);
         let point = self.origin + u * self.edges[0] + v * self.edges[1];
-        let normal = self.curved.map_or(self.normal, |[n, along, across]| (n + u * along + v * across).normalize());
+        let normal = self.normals.map_or(self.normal, |[n, along, across]| (n + u * along + v * across).normalize());
         Place { point, normal, triangle: self.triangle }
     }
 }
@@ -135,22 +135,22 @@ impl Receivers for ElementReceivers<'_> {
     }
 }
 
-/// Elements that receive with the normals of the smooth surface that they stand for, as points of it do.
-pub struct CurvedReceivers<'a> {
+/// Elements that receive with given normals, those of the smooth surface that they stand for, as points of it do.
+pub struct ShadedReceivers<'a> {
     /// All elements.
     pub all: &'a ElementReceivers<'a>,
     /// Those that receive, and the unit normals at their corners.
-    pub curved: &'a [(u32, [DVec3; 3])],
+    pub shaded: &'a [(u32, [DVec3; 3])],
 }
 
-impl Receivers for CurvedReceivers<'_> {
+impl Receivers for ShadedReceivers<'_> {
     fn len(&self) -> usize {
-        self.curved.len()
+        self.shaded.len()
     }
 
     fn site(&self, i: usize) -> Option<Site> {
-        let (element, [a, b, c]) = self.curved[i];
-        self.all.site(element as usize).map(|site| Site { curved: Some([a, b - a, c - a]), ..site })
+        let (element, [a, b, c]) = self.shaded[i];
+        self.all.site(element as usize).map(|site| Site { normals: Some([a, b - a, c - a]), ..site })
     }
 
     fn buried(&self, tracer: &Tracer, place: &Place, seed: u32) -> bool {
@@ -158,15 +158,15 @@ impl Receivers for CurvedReceivers<'_> {
     }
 
     fn places(&self, i: usize, wanted: u32) -> u32 {
-        self.all.places(self.curved[i].0 as usize, wanted)
+        self.all.places(self.shaded[i].0 as usize, wanted)
     }
 
     fn near(&self, i: usize) -> Option<f64> {
-        self.all.near(self.curved[i].0 as usize)
+        self.all.near(self.shaded[i].0 as usize)
     }
 
     fn seed(&self, i: usize) -> u32 {
-        self.curved[i].0
+        self.shaded[i].0
     }
 }
 
@@ -185,7 +185,7 @@ impl Receivers for PointReceivers<'_> {
 
     fn site(&self, i: usize) -> Option<Site> {
         let Place { point, normal, triangle } = self.places[i];
-        let site = Site { origin: point, edges: [DVec3::ZERO; 2], normal, curved: None, triangle, mask: u64::MAX };
+        let site = Site { origin: point, edges: [DVec3::ZERO; 2], normal, normals: None, triangle, mask: u64::MAX };
         (normal != DVec3::ZERO).then_some(site)
     }
 

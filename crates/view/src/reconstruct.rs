@@ -1,8 +1,8 @@
 //! A continuous field from values that are constant on elements.
 //!
 //! Values sit on the corners of the cells of each triangle and are interpolated linearly. A corner's value is the
-//! area-weighted mean of the elements around it, over all triangles that are smooth there; so constants stay constant,
-//! and light is continuous where the surface is. Where two triangles of different division share an edge, the coarser
+//! area-weighted mean of the elements around it, over all triangles that are smooth there, moved where these lie to one side
+//! of it, and made equal across slivers; so constants stay constant, and light is continuous where the surface is. Where two triangles of different division share an edge, the coarser
 //! one's corners count and the finer one's others on that edge are interpolated between them (anchored hanging nodes),
 //! so that no crack opens (catalogue 49, 61).
 
@@ -56,18 +56,17 @@ impl Field {
         Field { base: corners.base, division: corners.division, values }
     }
 
-    /// The cells whose values decide those of the field on cells that are looked at, where `looks` is not zero: these, and
-    /// all that share a corner with one.
-    pub fn around(mesh: &Mesh, elements: &Elements, looks: &[u32]) -> Vec<bool> {
+    /// By cell, whether it shares a corner with one of `cells`, or is one.
+    pub fn around(mesh: &Mesh, elements: &Elements, cells: &[bool]) -> Vec<bool> {
         let corners = Corners::new(mesh, elements);
         let mut touched = vec![false; corners.count];
         let number = |lattice: usize| corners.number[lattice] as usize;
         corners.each_cell(|cell, around| {
-            if looks[cell] > 0 {
+            if cells[cell] {
                 around.into_iter().for_each(|lattice| touched[number(lattice)] = true);
             }
         });
-        let mut all = vec![false; looks.len()];
+        let mut all = vec![false; cells.len()];
         corners.each_cell(|cell, around| all[cell] = around.into_iter().any(|lattice| touched[number(lattice)]));
         all
     }
@@ -275,6 +274,10 @@ mod tests {
             let t = wall.iter().find(|t| uv(t).min_element() >= 0.0 && uv(t).element_sum() <= 1.0).unwrap();
             rough.at(*t, uv(t), Side::Front)[0]
         };
+        let half_lit = field(&|e| f64::from(e % 2) * 100.0);
+        for (t, uv) in wall.iter().flat_map(|t| [(0.1, 0.1), (0.0, 1.0), (0.5, 0.5)].map(|uv| (*t, DVec2::from(uv)))) {
+            assert!(half_lit.at(t, uv, Side::Front)[0] >= 0.0);
+        }
         let across = DVec3::new(2.8, -4.5, 0.0).normalize();
         for share in [0.3, 0.5, 0.7, 0.9] {
             let p = DVec3::new(4.5, 2.755, 0.0) * share;
@@ -291,10 +294,10 @@ mod tests {
             let (t, _) = elements.place(elements.of_cell(cell).start);
             elements.cell_corners(cell).map(|uv| mesh.point(t, uv))
         };
-        let mut looks = vec![0; elements.cells()];
+        let mut cells = vec![false; elements.cells()];
         let seen = elements.cell(elements.at(0, 0.6, 0.2, Side::Front).unwrap());
-        looks[seen] = 3;
-        let around = Field::around(&mesh, &elements, &looks);
+        cells[seen] = true;
+        let around = Field::around(&mesh, &elements, &cells);
         for (cell, is_around) in around.iter().enumerate() {
             let touches = corners_of(cell).iter().any(|p| corners_of(seen).iter().any(|q| p.distance(*q) < 1e-9));
             assert_eq!(*is_around, touches, "{cell}");

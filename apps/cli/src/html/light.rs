@@ -64,7 +64,7 @@ pub fn illuminance(report: &Report) -> String {
             };
             (name, plot::bar(&[(&paint(class), class.share / top)]), vec![share(class.share)])
         };
-        body += "<h3>Share of the exposed area</h3>";
+        body += "<h3>Share of the lit area</h3>";
         body += &bars(light.classes.iter().enumerate().map(row));
     }
     if !light.surfaces.is_empty() {
@@ -84,11 +84,20 @@ pub fn illuminance(report: &Report) -> String {
     }
     let referee = match report.error.points {
         0 => String::new(),
-        _ => format!(" The audit's own mean at its points is {}.", lux(report.error.mean_illuminance)),
+        _ => format!(
+            " The audit's own mean at its points, dark ones included, is {}.",
+            lux(report.error.mean_illuminance)
+        ),
+    };
+    let dark = match light.dark {
+        dark if dark < 0.0005 => String::new(),
+        dark => {
+            format!(" No light reaches {} of the area, such as insides of solids; it is left out above.", share(dark))
+        }
     };
     body += &note(&format!(
-        "Illuminance in lux is the light that arrives on a surface, by elements {} wide. Extremes depend on their size, \
-         the mean hardly does.{referee}",
+        "Illuminance in lux is the light that arrives on a surface, on both sides of two-sided ones, by elements {} wide. \
+         Extremes depend on their size, the mean hardly does.{dark}{referee}",
         with_unit(report.solution.element_size, "m"),
     ));
     section("Illuminance", &body)

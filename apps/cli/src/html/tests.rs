@@ -51,6 +51,7 @@ fn example(rounds: usize) -> Report {
             finer: "try more".to_owned(),
         },
         illuminance: Illuminance {
+            dark: 0.0,
             low: 3.2,
             mean: 412.0,
             median: 377.0,

@@ -75,12 +75,24 @@ impl<'a> Library<'a> {
                 "Tr" => draft.opacity = one(rest, keyword, &place, faults).map(|t| 1.0 - t).or(draft.opacity),
                 "map_Kd" => draft.map_kd = self.map(rest, folder, &place, faults),
                 "map_Ke" => draft.map_ke = self.map(rest, folder, &place, faults),
-                "map_d" => faults.note(place(), "map_d is not read", "put alpha into the picture of map_Kd"),
+                "map_d" => {
+                    self.mention(rest, folder);
+                    faults.note(place(), "map_d is not read", "put alpha into the picture of map_Kd");
+                }
+                "bump" | "disp" | "decal" | "refl" | "norm" => self.mention(rest, folder),
+                _ if keyword.starts_with("map_") => self.mention(rest, folder),
                 _ => {}
             }
         }
         if let Some(draft) = current.take() {
             self.keep(draft, faults);
+        }
+    }
+
+    /// A picture that is not read, named behind its options.
+    fn mention(&self, rest: &str, folder: &str) {
+        if let Some(name) = rest.split_whitespace().last() {
+            self.source.mention(&escaped(&format!("{folder}{name}")));
         }
     }
 

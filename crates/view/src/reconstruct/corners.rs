@@ -14,21 +14,28 @@ const MOVED: f64 = 1.5;
 /// half or more, beside a sliver as well, and nothing in the middle of a regular lattice.
 const ONE_SIDED: f64 = 0.5;
 
-/// A triangle is a sliver where its longest edge is so many times as long as it is high. Between larger ones light is as good
+/// A triangle is a sliver where its longest edge is so many times as long as it is high, which well-shaped ones with vertices on
+/// their edges are not. Between larger ones light is as good
 /// as equal across it, but the cells beside its two long edges, by which these are told, are not the same.
 const SLIVER: f64 = 6.0;
 
-/// Larger are those whose cells are so many times as large.
+/// Larger are those whose cells are so many times as large. Without this, strips along walls and rugs, across which light does
+/// change, were made even: 4.4 % instead of 3.6 % in a furnished room.
 const LARGER: f64 = 4.0;
 
 /// Triangles lie on one plane where their normals differ by less than this cosine, of a degree.
 const FLAT: f64 = 0.9998;
 
-/// How often what lies across slivers is made equal.
+/// How often what lies across slivers is made equal: a sliver is some cells across.
 const EQUALIZED: usize = 4;
 
 /// A corner is not moved to less than this part of its mean, nor by more than to twice of it.
 const LEAST: f64 = 0.5;
+
+/// A moved value, not too far from what it was before.
+fn within(moved: f64, before: f64) -> f64 {
+    moved.max(LEAST * before.abs()).min(before.abs() / LEAST)
+}
 
 /// The corners of all triangles, those that several share counted once.
 pub(super) struct Corners<'a> {
@@ -139,8 +146,7 @@ impl<'a> Corners<'a> {
         for ((mean, missing), one_sided) in means.iter_mut().zip(self.mean(&missing)).zip(self.one_sidedness(cells)) {
             if let (Some(mean), Some(missing)) = (mean, missing) {
                 for (mean, missing) in mean.iter_mut().zip(missing) {
-                    let (least, most) = (LEAST * mean.abs(), mean.abs() / LEAST);
-                    *mean = (*mean + MOVED * one_sided * missing).max(least).min(most);
+                    *mean = within(*mean + MOVED * one_sided * missing, *mean);
                 }
             }
         }
@@ -152,6 +158,7 @@ impl<'a> Corners<'a> {
     /// edge at its foot is taken from it by one half and added there by the other.
     fn equalize(&self, means: &mut [Option<[f64; 3]>]) {
         let slivers = self.slivers();
+        let before = means.to_vec();
         for _ in 0..EQUALIZED {
             for &([a, b, tip], foot) in &slivers {
                 let (Some(from), Some(to), Some(own)) = (means[a], means[b], means[tip]) else { continue };
@@ -159,6 +166,11 @@ impl<'a> Corners<'a> {
                 let moved = |value: [f64; 3], share: f64| Some(std::array::from_fn(|k| value[k] + share * more[k]));
                 (means[a], means[b]) = (moved(from, 0.5 * (1.0 - foot)), moved(to, 0.5 * foot));
                 means[tip] = moved(own, -0.5);
+            }
+        }
+        for (mean, before) in means.iter_mut().zip(before) {
+            if let (Some(mean), Some(before)) = (mean, before) {
+                (0..3).for_each(|band| mean[band] = within(mean[band], before[band]));
             }
         }
     }

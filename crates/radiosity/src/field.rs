@@ -1,0 +1,157 @@
+//! Indirect light as a continuous field, as points of the surfaces receive it: by the author's normals, and without visible
+//! noise where it is looked at.
+
+use crate::measure::brought_nothing;
+use crate::monitor::{Monitor, Watch};
+use crate::{Error, Solution};
+use glam::DVec3;
+use radiosity_scene::{Bands, luminance};
+use radiosity_transport::{ElementReceivers, ShadedReceivers};
+use radiosity_view::Field;
+use radiosity_view::picture::shading_normal;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Elements are flat where normals differ from theirs by less than this cosine, that of half a degree: light that comes from
+/// one side changes by less than one percent.
+const FLAT: f64 = 0.99996;
+
+/// Fewest rays that gather for an element of a divided cell: what is left of 128 for the smallest of 16.
+const FEWEST_RAYS: usize = 8;
+
+/// Rays that gather for a cell that is looked at are doubled up to this: half a minute for 15,000 cells.
+const MOST_RAYS: usize = 4096;
+
+/// By how much the continuous field lessens the noise of cells: a corner is the mean of some six of them.
+pub(crate) const SMOOTHING: f64 = 2.4;
+
+/// An element, and the unit normals at its corners that it receives with.
+type Shaded = (u32, [DVec3; 3]);
+
+impl Solution<'_> {
+    /// The continuous field of the indirect irradiance.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn indirect_field(&self, monitor: &dyn Monitor) -> Result<Field, Error> {
+        Ok(self.field_of(&self.received(monitor)?))
+    }
+
+    /// Indirect irradiance of each element, by two halves of its rays. Elements that stand for a curved surface gather it anew
+    /// with its normals: by those of its facets it would show bands.
+    pub(crate) fn received(&self, monitor: &dyn Monitor) -> Result<Vec<[Bands; 2]>, Error> {
+        let curved: Vec<Shaded> = (0..self.elements.len() as u32)
+            .into_par_iter()
+            .map(|element| (element, self.shading_normals(element)))
+            .filter(|(element, normals)| {
+                let own = self.elements.normal(self.tracer().mesh, *element);
+                normals.iter().any(|normal| normal.dot(own) < FLAT)
+            })
+            .collect();
+        let mut light = self.indirect_halves();
+        self.gather_on(&curved, self.rays(), &mut light, monitor)?;
+        Ok(light)
+    }
+
+    /// The field of `light` by element, in halves, where cells are looked at, each as often as `looks` says. Where its noise there is
+    /// more than `error`, these and what is around them gather anew with twice the rays, until it is not, or that brings
+    /// nothing, or there are 4,096 for each cell.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub(crate) fn field_on(
+        &self,
+        looks: &[u32],
+        mut light: Vec<[Bands; 2]>,
+        error: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Field, Error> {
+        let mesh = self.tracer().mesh;
+        let is_seen: Vec<bool> = looks.iter().map(|looks| *looks > 0).collect();
+        // A corner at which cells lie to one side is moved by what those beside it say.
+        let around = Field::around(mesh, &self.elements, &Field::around(mesh, &self.elements, &is_seen));
+        let elements = (0..around.len()).filter(|cell| around[*cell]).flat_map(|cell| self.elements.of_cell(cell));
+        let seen: Vec<Shaded> = elements.map(|element| (element, self.shading_normals(element))).collect();
+        let noise = |light: &[[Bands; 2]]| self.noise(light, |cell, _| f64::from(looks[cell])) / SMOOTHING;
+        let mut noises = vec![noise(&light)];
+        let mut rays = 2 * self.rays();
+        while noises.last().is_some_and(|last| *last > error) && rays <= MOST_RAYS && !brought_nothing(&noises) {
+            self.gather_on(&seen, rays, &mut light, monitor)?;
+            noises.push(noise(&light));
+            rays *= 2;
+        }
+        Ok(self.field_of(&light))
+    }
+
+    /// The field of light by element, in halves.
+    pub(crate) fn field_of(&self, light: &[[Bands; 2]]) -> Field {
+        let mean = |[a, b]: &[Bands; 2]| std::array::from_fn(|band| 0.5 * (a[band] + b[band]));
+        let indirect: Vec<Bands> = light.iter().map(mean).collect();
+        Field::new(self.tracer().mesh, &self.elements, &indirect, &self.exposed_area())
+    }
+
+    /// Relative standard error of the irradiance of cells that comes from the rows' sampling, by the difference of their
+    /// two halves, which makes it 15 to 40 % too large: root mean square over the exposed area.
+    pub fn row_noise(&self) -> f64 {
+        self.noise(&self.indirect_halves(), |_, exposed| exposed)
+    }
+
+    /// The noise of indirect light by element, in halves: root mean square over cells, by the weight that is given for a cell
+    /// and its exposed area, each relative to its own irradiance E, as the eye takes it, and by E/(E + mean E), so that neither
+    /// the dark insides of furniture nor a bright garden decide.
+    fn noise(&self, light: &[[Bands; 2]], weight: impl Fn(usize, f64) -> f64) -> f64 {
+        let exposed = self.exposed_area();
+        // By cell: weight, irradiance, standard error.
+        let cell = |cell: usize| {
+            let (mut area, mut flux, mut difference) = (0.0, 0.0, 0.0);
+            for e in self.elements.of_cell(cell).map(|e| e as usize) {
+                let [a, b] = light[e].map(|half| f64::from(luminance(half)));
+                area += exposed[e];
+                flux += exposed[e] * (0.5 * (a + b) + f64::from(luminance(self.columns.mean(e))));
+                difference += exposed[e] * 0.5 * (a - b);
+            }
+            (area > 0.0 && flux > 0.0).then(|| (weight(cell, area), flux / area, difference / area))
+        };
+        let cells: Vec<(f64, f64, f64)> = (0..self.elements.cells()).filter_map(cell).collect();
+        let total: f64 = cells.iter().map(|(weight, ..)| weight).sum();
+        let mean = cells.iter().map(|(weight, e, _)| weight * e).sum::<f64>() / total.max(f64::MIN_POSITIVE);
+        let (mut noise, mut sum) = (0.0, 0.0);
+        for (weight, e, error) in cells {
+            let counted = weight * e / (e + mean);
+            noise += counted * (error / e).powi(2);
+            sum += counted;
+        }
+        (noise / sum.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    /// Puts what elements gather with `rays` rays per cell into `light`.
+    fn gather_on(
+        &self,
+        elements: &[Shaded],
+        rays: usize,
+        light: &mut [[Bands; 2]],
+        monitor: &dyn Monitor,
+    ) -> Result<(), Error> {
+        let all = ElementReceivers { mesh: self.tracer().mesh, elements: &self.elements, exposure: &self.exposure };
+        // Elements of a divided cell share its rays.
+        let mut by_pieces: BTreeMap<u32, Vec<Shaded>> = BTreeMap::new();
+        for element in elements {
+            by_pieces.entry(self.elements.pieces(element.0)).or_default().push(*element);
+        }
+        for (pieces, shaded) in &by_pieces {
+            let receivers = ShadedReceivers { all: &all, shaded };
+            let rays = (rays / *pieces as usize).max(FEWEST_RAYS);
+            let gather = || self.gather().irradiance(&receivers, rays, &Watch(monitor));
+            for ((element, _), halves) in shaded.iter().zip(self.stages.time(monitor, "gather on surfaces", gather)?) {
+                light[*element as usize] = halves;
+            }
+        }
+        Ok(())
+    }
+
+    /// The normals that light is received with at an element's corners.
+    fn shading_normals(&self, element: u32) -> [DVec3; 3] {
+        let (triangle, side) = self.elements.place(element);
+        self.elements.corners(element).map(|uv| shading_normal(self.tracer(), triangle, uv, side))
+    }
+}
