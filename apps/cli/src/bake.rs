@@ -57,6 +57,9 @@ enum TexelEncoding {
     Linear,
 }
 
+/// Pages that a lightmap hardly gets to: of 4096 × 4096 texels each.
+const PAGES: usize = 1000;
+
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let target = output_path(arguments);
@@ -69,6 +72,11 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.promise(path, &["json", "html"])?;
     }
     if let Some(path) = &arguments.image {
+        // How many pages there will be is known after hours.
+        let has_pages = !(arguments.vertices || arguments.unlit);
+        if has_pages && (1..PAGES).any(|page| page_path(&target, page) == *path) {
+            return Err(Failure::input(format!("{}: a page of the lightmap may get this name", path.display())));
+        }
         outputs.promise(path, &["png", "exr"])?;
     }
     progress.part("reading");
