@@ -57,6 +57,9 @@ enum TexelEncoding {
     Linear,
 }
 
+/// By how much smaller a picture is that nobody sees.
+const METERED: u32 = 4;
+
 /// Pages that a lightmap hardly gets to: of 4096 × 4096 texels each.
 const PAGES: usize = 1000;
 
@@ -88,8 +91,10 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
     let tracer = Tracer::new(&input.scene, &input.mesh);
     let is_json = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let is_exposed = arguments.unlit || !arguments.report.iter().all(is_json);
-    let wants_view = is_exposed || arguments.image.is_some();
+    let has_page = !arguments.report.iter().all(is_json);
+    let is_shown = has_page || arguments.image.is_some();
+    let wants_view = is_shown || (arguments.unlit && arguments.picture.exposure.is_none());
+    let is_exposed = arguments.unlit || has_page;
     let is_exposed = is_exposed || arguments.image.as_deref().is_some_and(|path| !views::is_exr(path));
     arguments.picture.warn_of_what_has_no_effect(wants_view, is_exposed, progress);
     // A camera that is not there is a fault even where none is needed.
@@ -102,7 +107,9 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");
     let look = |camera: &Camera| {
-        let (width, height) = views::picture_size(camera, arguments.picture.size);
+        let size = views::picture_size(camera, arguments.picture.size);
+        // To meter the light a small picture is enough.
+        let (width, height) = if is_shown { size } else { (size.0.div_ceil(METERED), size.1.div_ceil(METERED)) };
         let options = RenderOptions { width, height, ..RenderOptions::default() };
         radiosity::render(&baked, camera, &options, progress)
     };
