@@ -22,6 +22,9 @@ const FEWEST_RAYS: usize = 8;
 /// Rays that gather for a cell that is looked at are doubled up to this: half a minute for 15,000 cells.
 const MOST_RAYS: usize = 4096;
 
+/// Noise that is seen on a smooth wall, relative to its light: pictures have no more, whatever error is asked for.
+const VISIBLE: f64 = 0.01;
+
 /// By how much the continuous field lessens the noise of cells: a corner is the mean of some six of them.
 pub(crate) const SMOOTHING: f64 = 2.4;
 
@@ -54,7 +57,7 @@ impl Solution<'_> {
     }
 
     /// The field of `light` by element, in halves, where cells are looked at, each as often as `looks` says. Where its noise there is
-    /// more than `error`, these and what is around them gather anew with twice the rays, until it is not, or that brings
+    /// more than `error`, or than is visible, these and what is around them gather anew with twice the rays, until it is not, or that brings
     /// nothing, or there are 4,096 for each cell.
     ///
     /// # Errors
@@ -75,7 +78,10 @@ impl Solution<'_> {
         let noise = |light: &[[Bands; 2]]| self.noise(light, |cell, _| f64::from(looks[cell])) / SMOOTHING;
         let mut noises = vec![noise(&light)];
         let mut rays = 2 * self.rays();
-        while noises.last().is_some_and(|last| *last > error) && rays <= MOST_RAYS && !brought_nothing(&noises) {
+        while noises.last().is_some_and(|last| *last > error.min(VISIBLE))
+            && rays <= MOST_RAYS
+            && !brought_nothing(&noises)
+        {
             self.gather_on(&seen, rays, &mut light, monitor)?;
             noises.push(noise(&light));
             rays *= 2;
