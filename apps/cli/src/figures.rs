@@ -14,7 +14,7 @@ pub const MEAN: &str = "by area, over all that any light reaches";
 pub const MEDIAN: &str = "half of the lit area gets more";
 pub const LARGEST: &str = "the brightest element";
 pub const UNIFORMITY: &str =
-    "low over mean, of all surfaces; not the least over mean of a task area, for which there is `measure`";
+    "low over mean, of all surfaces; not the least over mean of a task area, for which there is the verb measure";
 
 pub const EMITTED: &str = "given off by luminous surfaces";
 pub const FROM_POINT_LIGHTS: &str = "received from lights without area: point, spot, directional";
