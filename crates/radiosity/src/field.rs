@@ -56,9 +56,9 @@ impl Solution<'_> {
         Ok(light)
     }
 
-    /// The field of `light` by element, in halves, where cells are looked at, each as often as `looks` says. Where its noise there is
-    /// more than `error`, or than is visible, these and what is around them gather anew with twice the rays, until it is not, or that brings
-    /// nothing, or there are 4,096 for each cell.
+    /// The field of `light` by element, in halves, where cells are looked at, each as often as `looks` says. Where its noise
+    /// there is more than `error`, or than is visible, these and what is around them gather anew with twice the rays, until
+    /// it is not, or that brings nothing, or there are 4,096 for each cell.
     ///
     /// # Errors
     /// [`Error::Stopped`].
