@@ -7,6 +7,7 @@
 pub mod camera;
 pub mod display;
 pub mod elements;
+pub mod facet;
 pub mod fault;
 pub mod light;
 pub mod material;
@@ -17,6 +18,7 @@ pub mod texture;
 
 pub use camera::{Camera, Projection};
 pub use elements::{ElementId, Elements};
+pub use facet::{Enclosure, EnclosureSurface, Facet, FacetError};
 pub use fault::{Fault, Faults, Severity, counted};
 pub use light::{PointLight, PointLightKind};
 pub use material::{AlphaMode, Material, TextureRef};

@@ -10,16 +10,20 @@ pub mod exposure;
 pub mod gather;
 pub mod luminaires;
 mod one_light;
+pub mod pair;
 mod pilot;
 pub mod polygon;
 pub mod receivers;
+pub mod row;
 pub mod rows;
 
 pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;
 pub use gather::Gather;
 pub use luminaires::{Light, Luminaires};
+pub use pair::{Factor, Occlusion, Pair, Unoccluded};
 pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers};
+pub use row::{Row, RowFactors};
 pub use rows::{HitTable, IdSpace};
 
 /// Tells a long computation's progress and may end it.
