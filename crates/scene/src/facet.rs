@@ -57,7 +57,7 @@ impl Facet {
         let fan = || corners[1..].windows(2).map(|pair| [pair[0] - origin, pair[1] - origin]);
         let twice: DVec3 = fan().map(|[a, b]| a.cross(b)).sum();
         let area = 0.5 * twice.length();
-        if !(area > LINE * extent * extent) {
+        if area.is_nan() || area <= LINE * extent * extent {
             return Err(FacetError::NoArea);
         }
         let normal = twice / (2.0 * area);
