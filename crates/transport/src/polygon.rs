@@ -39,7 +39,7 @@ pub fn point_to_triangle(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> f6
 
 /// The contour integral of a polygon above the horizon, its corners relative to the receiver. The corners of an
 /// emitter run counter-clockwise seen from the receiver, so Γ points away from the normal; hence the order b × a.
-fn contour(polygon: &[DVec3], normal: DVec3) -> f64 {
+pub(crate) fn contour(polygon: &[DVec3], normal: DVec3) -> f64 {
     let mut sum = 0.0;
     for (i, &a) in polygon.iter().enumerate() {
         let b = polygon[(i + 1) % polygon.len()];

@@ -1,0 +1,68 @@
+//! The planar cases of the reference values, closed forms and exact integrals of 15 digits, by every method that
+//! promises digits.
+
+use glam::DVec3;
+use radiosity_scene::Facet;
+use radiosity_transport::pair::exact::exact;
+use serde_json::Value;
+
+fn cases(text: &str) -> Vec<Value> {
+    let file: Value = serde_json::from_str(text).unwrap();
+    file["cases"].as_array().unwrap().clone()
+}
+
+fn vector(v: &Value) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|k| v[k].as_f64().unwrap()))
+}
+
+fn facet(corners: &Value) -> Facet {
+    Facet::new(corners.as_array().unwrap().iter().map(vector).collect()).unwrap()
+}
+
+/// The cases between two polygons: their name, the polygons, and F.
+fn pairs(text: &str) -> Vec<(Value, [Facet; 2], f64)> {
+    let pair = |case: Value| {
+        let surfaces =
+            case["surfaces"].as_array().filter(|s| s.len() == 2 && s.iter().all(|s| s["type"] == "polygon"))?;
+        let facets = [0, 1].map(|k| facet(&surfaces[k]["vertices"]));
+        let value = case["value"].as_f64().unwrap();
+        Some((case, facets, value))
+    };
+    cases(text).into_iter().filter_map(pair).collect()
+}
+
+#[test]
+fn catalogue_17_polygons_by_the_closed_form() {
+    let pairs = pairs(include_str!("data/view_factors.json"));
+    assert!(pairs.len() >= 17, "{}", pairs.len());
+    for (case, [from, to], truth) in pairs {
+        let value = exact(&from, &to) / from.area();
+        // The reference has 15 digits.
+        assert!((value - truth).abs() <= 1e-13, "{}: {value} for {truth}", case["id"]);
+        assert_eq!(exact(&from, &to), exact(&to, &from), "{}", case["id"]);
+    }
+}
+
+/// What leaves a face of a regular solid reaches the others, and by symmetry in the shares of the reference.
+#[test]
+fn catalogue_17_rows_of_platonic_solids_sum_to_one() {
+    let mut count = 0;
+    for case in cases(include_str!("data/view_factors.json")) {
+        let Some(faces) = case["surfaces"][0]["faces"].as_array() else { continue };
+        let faces: Vec<Facet> = faces.iter().map(facet).collect();
+        for from in &faces {
+            let mut row: Vec<f64> = faces.iter().map(|to| exact(from, to) / from.area()).collect();
+            let sum: f64 = row.iter().sum();
+            assert!((sum - 1.0).abs() < 1e-13, "{}: {sum}", case["id"]);
+            let mut truth: Vec<f64> = case["F0j"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+            truth.push(0.0);
+            row.sort_by(f64::total_cmp);
+            truth.sort_by(f64::total_cmp);
+            for (value, truth) in row.iter().zip(&truth) {
+                assert!((value - truth).abs() < 1e-13, "{}: {value} for {truth}", case["id"]);
+            }
+        }
+        count += 1;
+    }
+    assert!(count >= 3);
+}
