@@ -16,6 +16,7 @@ pub mod polygon;
 pub mod receivers;
 pub mod row;
 pub mod rows;
+pub mod view_factors;
 
 pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;

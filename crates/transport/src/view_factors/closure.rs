@@ -1,0 +1,151 @@
+//! Closure: how far rows are from summing to one, and a repair that moves uncertain entries and no others.
+//!
+//! In a closed enclosure Σ_j F_ij = 1. The repair is the least change that makes it so: Σ (ΔS_ij/σ_ij)² is least under
+//! Σ_j S_ij = A_i, where S is the symmetric exchange area and σ its error (van Leersum 1989, "A method for determining a
+//! consistent set of radiation view factors", with errors for weights). Its solution is ΔS_ij = σ_ij² (λ_i + λ_j); the
+//! multipliers λ come from a symmetric system, by conjugate gradients. Entries stay at or above zero. What is certain
+//! does not move, so a gap in the enclosure does not close: the defect that is left is reported.
+
+use super::ViewFactors;
+use serde::Serialize;
+
+/// How far the rows of an enclosure are from summing to one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Closure {
+    /// Root of the mean square of Σ_j F_ij − 1.
+    pub rms: f64,
+    /// Largest |Σ_j F_ij − 1|.
+    pub largest: f64,
+    /// The row of it.
+    pub row: usize,
+    /// Mean of Σ_j F_ij − 1.
+    pub mean: f64,
+}
+
+impl Closure {
+    /// Of rows with the given sums.
+    pub fn of(sums: &[f64]) -> Closure {
+        let mut closure = Closure::default();
+        for (row, sum) in sums.iter().enumerate() {
+            let off = sum - 1.0;
+            closure.mean += off;
+            closure.rms += off * off;
+            if off.abs() > closure.largest {
+                (closure.largest, closure.row) = (off.abs(), row);
+            }
+        }
+        let n = sums.len().max(1) as f64;
+        (closure.mean, closure.rms) = (closure.mean / n, (closure.rms / n).sqrt());
+        closure
+    }
+}
+
+/// What a repair did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Repair {
+    /// Before.
+    pub before: Closure,
+    /// After.
+    pub after: Closure,
+    /// Largest change of a factor.
+    pub largest_change: f64,
+    /// Largest change relative to the entry's stated error: above one, the enclosure is not closed, or an error was
+    /// stated too small.
+    pub largest_relative: f64,
+    /// Rounds that the bound at zero took.
+    pub rounds: usize,
+}
+
+/// Rounds after which entries at zero are left there.
+const ROUNDS: usize = 20;
+
+impl ViewFactors {
+    /// How far rows are from summing to one.
+    pub fn closure(&self) -> Closure {
+        Closure::of(&self.row_sums())
+    }
+
+    /// Makes rows sum to one by moving entries within their errors' reach.
+    pub fn repair(&mut self) -> Repair {
+        let mut repair = Repair { before: self.closure(), ..Repair::default() };
+        let original: Vec<f64> = self.entries().map(|(.., value, _)| value).collect();
+        for round in 1..=ROUNDS {
+            repair.rounds = round;
+            let off: Vec<f64> = self.row_sums().iter().zip(self.areas()).map(|(sum, a)| a * (1.0 - sum)).collect();
+            let lambda = self.multipliers(&off);
+            let mut clipped = false;
+            for (i, j, value, error) in self.entries() {
+                clipped |= value + error * error * (lambda[i] + lambda[j]) < 0.0;
+            }
+            self.map(|i, j, value, error| (value + error * error * (lambda[i] + lambda[j])).max(0.0));
+            if !clipped {
+                break;
+            }
+        }
+        repair.after = self.closure();
+        for ((i, j, value, error), before) in self.entries().zip(original) {
+            let change = (value - before).abs();
+            if change > 0.0 {
+                repair.largest_change = repair.largest_change.max(change / self.areas()[i].min(self.areas()[j]));
+                repair.largest_relative = repair.largest_relative.max(change / error);
+            }
+        }
+        repair
+    }
+
+    /// λ of Σ_j σ_ij² (λ_i + λ_j) = off_i, by conjugate gradients with the diagonal as preconditioner.
+    fn multipliers(&self, off: &[f64]) -> Vec<f64> {
+        let n = self.len();
+        let apply = |x: &[f64]| {
+            let mut y = vec![0.0; n];
+            for (i, j, _, error) in self.entries() {
+                let weight = error * error * (x[i] + x[j]);
+                y[i] += weight;
+                if i != j {
+                    y[j] += weight;
+                }
+            }
+            y
+        };
+        let mut diagonal = vec![0.0; n];
+        for (i, j, _, error) in self.entries() {
+            diagonal[i] += error * error * if i == j { 2.0 } else { 1.0 };
+            if i != j {
+                diagonal[j] += error * error;
+            }
+        }
+        let scaled = |r: &[f64]| -> Vec<f64> {
+            r.iter().zip(&diagonal).map(|(r, d)| if *d > 0.0 { r / d } else { 0.0 }).collect()
+        };
+        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let mut lambda = vec![0.0; n];
+        // Rows without an uncertain entry cannot be moved.
+        let mut r: Vec<f64> = off.iter().zip(&diagonal).map(|(r, d)| if *d > 0.0 { *r } else { 0.0 }).collect();
+        let mut z = scaled(&r);
+        let mut p = z.clone();
+        let mut rz = dot(&r, &z);
+        let target = 1e-24 * rz;
+        for _ in 0..(4 * n).clamp(100, 10_000) {
+            if rz <= target || rz == 0.0 {
+                break;
+            }
+            let ap = apply(&p);
+            let pap = dot(&p, &ap);
+            if pap <= 0.0 {
+                break;
+            }
+            let alpha = rz / pap;
+            for i in 0..n {
+                lambda[i] += alpha * p[i];
+                r[i] -= alpha * ap[i];
+            }
+            z = scaled(&r);
+            let next = dot(&r, &z);
+            for i in 0..n {
+                p[i] = z[i] + next / rz * p[i];
+            }
+            rz = next;
+        }
+        lambda
+    }
+}

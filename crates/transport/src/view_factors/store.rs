@@ -1,0 +1,220 @@
+//! The factors of an enclosure, each exchange area stored once.
+
+use super::Choices;
+use super::clear::Exchange;
+use crate::pair::Factor;
+use radiosity_scene::Enclosure;
+use rayon::prelude::*;
+
+/// One exchange area between two facets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Entry {
+    /// The facets, the lower index first.
+    pair: [u32; 2],
+    value: f64,
+    error: f32,
+}
+
+impl Entry {
+    pub fn new(a: u32, b: u32, exchange: Exchange) -> Entry {
+        Entry { pair: [a.min(b), a.max(b)], value: exchange.value, error: round_up(exchange.error) }
+    }
+}
+
+/// Single precision, never below.
+fn round_up(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
+}
+
+/// View factors between N facets (or surfaces), symmetric by storage: of A_i F_ij = A_j F_ji only i ≤ j is kept, by rows.
+#[derive(Clone, Debug, Default)]
+pub struct ViewFactors {
+    areas: Vec<f64>,
+    starts: Vec<usize>,
+    columns: Vec<u32>,
+    values: Vec<f64>,
+    errors: Vec<f32>,
+    /// How the pairs were found.
+    pub choices: Choices,
+}
+
+impl ViewFactors {
+    /// From entries in any order; those of one pair are summed.
+    pub(super) fn new(areas: Vec<f64>, entries: impl Iterator<Item = Vec<Entry>>, choices: Choices) -> ViewFactors {
+        let n = areas.len();
+        let chunks: Vec<Vec<Entry>> = entries.collect();
+        // By counting: rows first, then each row by column.
+        let mut counts = vec![0usize; n + 1];
+        for entry in chunks.iter().flatten() {
+            counts[entry.pair[0] as usize + 1] += 1;
+        }
+        for i in 0..n {
+            counts[i + 1] += counts[i];
+        }
+        let mut next = counts.clone();
+        let mut sorted = vec![(0u32, 0f64, 0f32); counts[n]];
+        for entry in chunks.iter().flatten() {
+            let slot = &mut next[entry.pair[0] as usize];
+            sorted[*slot] = (entry.pair[1], entry.value, entry.error);
+            *slot += 1;
+        }
+        drop(chunks);
+        let mut of = ViewFactors { areas, starts: vec![0], choices, ..ViewFactors::default() };
+        for i in 0..n {
+            let row = &mut sorted[counts[i]..counts[i + 1]];
+            // Stable, so that sums of several parts have one order.
+            row.sort_by_key(|entry| entry.0);
+            for &(column, value, error) in &*row {
+                let first = of.starts[i];
+                if of.columns.len() > first && of.columns.last() == Some(&column) {
+                    let last = of.values.len() - 1;
+                    of.values[last] += value;
+                    of.errors[last] += error;
+                } else {
+                    of.columns.push(column);
+                    of.values.push(value);
+                    of.errors.push(error);
+                }
+            }
+            of.starts.push(of.columns.len());
+        }
+        of
+    }
+
+    /// Number of facets (or surfaces).
+    pub fn len(&self) -> usize {
+        self.areas.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.areas.is_empty()
+    }
+
+    /// Areas, m².
+    pub fn areas(&self) -> &[f64] {
+        &self.areas
+    }
+
+    /// Stored pairs.
+    pub fn stored(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// F_ij with its error.
+    pub fn factor(&self, i: usize, j: usize) -> Factor {
+        let (row, column) = (i.min(j), i.max(j) as u32);
+        let range = self.starts[row]..self.starts[row + 1];
+        match self.columns[range.clone()].binary_search(&column) {
+            Ok(k) => {
+                let k = range.start + k;
+                Factor { value: self.values[k] / self.areas[i], error: f64::from(self.errors[k]) / self.areas[i] }
+            }
+            Err(_) => Factor::default(),
+        }
+    }
+
+    /// Every stored pair (i, j ≥ i) with its exchange area and error, m².
+    pub fn entries(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> + '_ {
+        (0..self.len()).flat_map(move |i| {
+            let range = self.starts[i]..self.starts[i + 1];
+            range.map(move |k| (i, self.columns[k] as usize, self.values[k], f64::from(self.errors[k])))
+        })
+    }
+
+    /// Σ_j F_ij of each row.
+    pub fn row_sums(&self) -> Vec<f64> {
+        let mut sums = vec![0.0; self.len()];
+        for (i, j, value, _) in self.entries() {
+            sums[i] += value / self.areas[i];
+            if i != j {
+                sums[j] += value / self.areas[j];
+            }
+        }
+        sums
+    }
+
+    /// All factors, row by row: N × N.
+    pub fn dense(&self) -> Vec<f64> {
+        let n = self.len();
+        let mut rows = vec![0.0; n * n];
+        for (i, j, value, _) in self.entries() {
+            rows[i * n + j] = value / self.areas[i];
+            rows[j * n + i] = value / self.areas[j];
+        }
+        rows
+    }
+
+    /// All factors by rows: starts, columns (ascending), values.
+    pub fn csr(&self) -> (Vec<usize>, Vec<u32>, Vec<f64>) {
+        let n = self.len();
+        let mut starts = vec![0usize; n + 1];
+        for (i, j, ..) in self.entries() {
+            starts[i + 1] += 1;
+            if i != j {
+                starts[j + 1] += 1;
+            }
+        }
+        for i in 0..n {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let (mut columns, mut values) = (vec![0u32; starts[n]], vec![0f64; starts[n]]);
+        // Ascending: row i first takes its mirrored columns below i, in order, as rows pass by, then its own.
+        for (i, j, value, _) in self.entries() {
+            let mut put = |row: usize, column: usize| {
+                let slot = &mut next[row];
+                columns[*slot] = column as u32;
+                values[*slot] = value / self.areas[row];
+                *slot += 1;
+            };
+            put(i, j);
+            if i != j {
+                put(j, i);
+            }
+        }
+        (starts, columns, values)
+    }
+
+    /// The factors between the surfaces that facets belong to: exchange areas sum up.
+    pub fn by_surface(&self, enclosure: &Enclosure) -> ViewFactors {
+        let n = enclosure.surfaces.len();
+        let mut rows: Vec<std::collections::BTreeMap<u32, (f64, f64)>> = vec![Default::default(); n];
+        for (i, j, value, error) in self.entries() {
+            let (a, b) = (enclosure.surface_of[i], enclosure.surface_of[j]);
+            // A pair within one surface counts from either side.
+            let times = if a == b && i != j { 2.0 } else { 1.0 };
+            let sum = rows[a.min(b) as usize].entry(a.max(b)).or_default();
+            sum.0 += times * value;
+            sum.1 += times * error;
+        }
+        let mut of =
+            ViewFactors { areas: enclosure.surface_areas(), starts: vec![0], choices: self.choices, ..Default::default() };
+        for row in rows {
+            for (column, (value, error)) in row {
+                of.columns.push(column);
+                of.values.push(value);
+                of.errors.push(round_up(error));
+            }
+            of.starts.push(of.columns.len());
+        }
+        of
+    }
+
+    /// Replaces every exchange area by what `change` makes of (i, j, value, error).
+    pub(super) fn map(&mut self, change: impl Fn(usize, usize, f64, f64) -> f64 + Sync) {
+        let rows: Vec<(usize, usize)> = self.starts.windows(2).map(|w| (w[0], w[1])).collect();
+        let (columns, errors) = (&self.columns, &self.errors);
+        let old = &self.values;
+        let new: Vec<f64> = rows
+            .par_iter()
+            .enumerate()
+            .flat_map_iter(|(i, &(start, end))| {
+                let change = &change;
+                (start..end).map(move |k| change(i, columns[k] as usize, old[k], f64::from(errors[k])))
+            })
+            .collect();
+        self.values = new;
+    }
+}
