@@ -9,7 +9,7 @@
 use super::clear::Exchange;
 use super::panel::Panel;
 use super::part::{Part, parallelogram};
-use super::visible::{Loop, Pieces, cut};
+use super::visible::{Loop, Shadows, keep_above};
 use glam::DVec3;
 use radiosity_scene::Facet;
 use rustc_hash::FxHashMap;
@@ -26,7 +26,7 @@ const MOST: usize = 4096;
 
 /// A_i F_ij of two parts past panels; `tolerance` and the answer in m², `whole` is the answer without panels.
 pub fn mixed(
-    pieces: &mut Pieces,
+    shadows: &mut Shadows,
     [a, b]: [&Part; 2],
     panels: &[&Panel],
     whole: Exchange,
@@ -34,18 +34,18 @@ pub fn mixed(
     touch: f64,
 ) -> (Exchange, bool) {
     let (outer, inner) = if distance(a, b, panels, touch) >= distance(b, a, panels, touch) { (a, b) } else { (b, a) };
-    let above = |part: &Part, other: &Part| -> Loop {
+    let above = |part: &Part, other: &Part| {
+        let mut left: Loop = part.shape.corners().iter().copied().collect();
         let normal = other.shape.normal();
-        cut(part.shape.corners(), normal, normal.dot(other.shape.corners()[0])).0
+        keep_above(&mut left, normal, normal.dot(other.shape.corners()[0])).then_some(left)
     };
-    let (from, target) = (above(outer, inner), above(inner, outer));
-    if from.len() < 3 || target.len() < 3 {
+    let (Some(from), Some(target)) = (above(outer, inner), above(inner, outer)) else {
         return (Exchange::default(), false);
-    }
+    };
     let Ok(from) = Facet::new(from.to_vec()) else { return (Exchange::default(), false) };
     let normal = outer.shape.normal();
 
-    let mut visible = Visible { pieces, normal, target: &target, panels, touch, hidden: false };
+    let mut visible = Visible { shadows, normal, target: &target, panels, touch, hidden: false };
     let [value, error] = integrate(&from, tolerance, |x| visible.factor(x));
     let value = value.clamp(0.0, whole.value);
     (Exchange { value, error: error + whole.error }, visible.hidden)
@@ -53,7 +53,7 @@ pub fn mixed(
 
 /// The visible factor of a target as a function of the place.
 struct Visible<'a> {
-    pieces: &'a mut Pieces,
+    shadows: &'a mut Shadows,
     normal: DVec3,
     target: &'a [DVec3],
     panels: &'a [&'a Panel],
@@ -63,7 +63,7 @@ struct Visible<'a> {
 
 impl Visible<'_> {
     fn factor(&mut self, x: DVec3) -> f64 {
-        let (factor, hidden) = self.pieces.factor(x, self.normal, self.target, self.panels, self.touch);
+        let (factor, hidden) = self.shadows.factor(x, self.normal, self.target, self.panels, self.touch);
         self.hidden |= hidden;
         factor
     }

@@ -30,7 +30,7 @@ use serde::Serialize;
 use shaft::{Stands, stands};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use store::Entry;
-use visible::Pieces;
+use visible::Shadows;
 
 /// How exact the factors are to be.
 #[derive(Clone, Copy, Debug)]
@@ -114,7 +114,7 @@ pub fn view_factors(
             panels: &panels,
             options,
             touch,
-            pieces: Pieces::default(),
+            shadows: Shadows::default(),
             choices: Choices::default(),
             entries: Vec::new(),
         };
@@ -137,7 +137,7 @@ struct Walk<'a> {
     panels: &'a [Panel],
     options: &'a ViewFactorOptions,
     touch: f64,
-    pieces: Pieces,
+    shadows: Shadows,
     choices: Choices,
     entries: Vec<Entry>,
 }
@@ -229,7 +229,7 @@ impl Walk<'_> {
             whole
         } else {
             self.choices.clipped += 1;
-            mixed(&mut self.pieces, [a, b], &panels, whole, self.options.accuracy * least, self.touch).0
+            mixed(&mut self.shadows, [a, b], &panels, whole, self.options.accuracy * least, self.touch).0
         };
         if exchange.value > 0.0 || exchange.error > 0.0 {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));

@@ -20,9 +20,31 @@ pub struct Panel {
     pub normal: DVec3,
     /// n · x of the points x of its plane.
     pub offset: f64,
+    /// Axes of the plane.
+    axes: [DVec3; 2],
+    /// The corners along the axes.
+    outline: Vec<DVec2>,
 }
 
 impl Panel {
+    /// The panel with these corners, counter-clockwise about `normal`.
+    pub fn new(corners: Vec<DVec3>, normal: DVec3) -> Panel {
+        let (x, y) = normal.any_orthonormal_pair();
+        let outline = corners.iter().map(|c| DVec2::new(x.dot(*c), y.dot(*c))).collect();
+        Panel { offset: normal.dot(corners[0]), normal, axes: [x, y], outline, corners }
+    }
+
+    /// A point along the axes of the plane.
+    #[inline]
+    pub fn flat(&self, point: DVec3) -> DVec2 {
+        DVec2::new(self.axes[0].dot(point), self.axes[1].dot(point))
+    }
+
+    /// The corners along the axes of the plane.
+    pub fn outline(&self) -> &[DVec2] {
+        &self.outline
+    }
+
     /// Height of a point above the plane.
     #[inline]
     pub fn height(&self, point: DVec3) -> f64 {
@@ -120,21 +142,16 @@ pub fn panels(enclosure: &Enclosure, planes: &mut Planes) -> Vec<Panel> {
     }
     let mut panels = Vec::new();
     for (plane, facets) in of_plane.iter().enumerate() {
-        let (normal, offset) = planes.plane(plane as u32);
+        let (normal, _) = planes.plane(plane as u32);
         if let [facet] = facets[..]
             && facet.is_convex()
         {
-            panels.push(panel(facet.corners().to_vec(), facet.normal()));
+            panels.push(Panel::new(facet.corners().to_vec(), facet.normal()));
             continue;
         }
-        panels.extend(united(facets, normal).into_iter().map(|corners| Panel { corners, normal, offset }));
+        panels.extend(united(facets, normal).into_iter().map(|corners| Panel::new(corners, normal)));
     }
     panels
-}
-
-fn panel(corners: Vec<DVec3>, normal: DVec3) -> Panel {
-    let offset = normal.dot(corners[0]);
-    Panel { corners, normal, offset }
 }
 
 /// Convex polygons that cover what the facets of one plane cover, counter-clockwise about `normal`.

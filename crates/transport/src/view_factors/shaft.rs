@@ -31,12 +31,12 @@ pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64) -> Stands
     }
 
     // Where segments cross the plane, in its own coordinates.
-    let (x, y) = panel.normal.any_orthonormal_pair();
-    let flat = |p: DVec3| DVec2::new(x.dot(p), y.dot(p));
+    let flat = |points: &[DVec3]| -> SmallVec<[DVec2; 8]> { points.iter().map(|p| panel.flat(*p)).collect() };
+    let (from, to) = (flat(from), flat(to));
     let mut crossings: SmallVec<[DVec2; 64]> = SmallVec::new();
-    let mut cross = |p: DVec3, hp: f64, q: DVec3, hq: f64| {
+    let mut cross = |p: DVec2, hp: f64, q: DVec2, hq: f64| {
         if (hp > 0.0) != (hq > 0.0) {
-            crossings.push(flat(p + hp / (hp - hq) * (q - p)));
+            crossings.push(p + hp / (hp - hq) * (q - p));
         }
     };
     for (p, hp) in from.iter().zip(&a) {
@@ -46,7 +46,7 @@ pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64) -> Stands
     }
     let parted = (a_above && b_below) || (a_below && b_above);
     if !parted {
-        for (points, heights) in [(from, &a), (to, &b)] {
+        for (points, heights) in [(&from, &a), (&to, &b)] {
             for i in 0..points.len() {
                 for k in 0..i {
                     cross(points[i], heights[i], points[k], heights[k]);
@@ -58,7 +58,7 @@ pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64) -> Stands
         return Stands::Aside;
     }
 
-    let corners: SmallVec<[DVec2; 8]> = panel.corners.iter().map(|c| flat(*c)).collect();
+    let corners = panel.outline();
     let mut all_within = true;
     for (i, &c) in corners.iter().enumerate() {
         let edge = corners[(i + 1) % corners.len()] - c;
@@ -76,7 +76,7 @@ pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64) -> Stands
     if all_within && parted {
         return Stands::Across;
     }
-    if is_parted_by_hull(&mut crossings, &corners, touch) { Stands::Aside } else { Stands::Between }
+    if is_parted_by_hull(&mut crossings, corners, touch) { Stands::Aside } else { Stands::Between }
 }
 
 /// Whether an edge of the hull of `points` parts it from the polygon `corners`.
@@ -117,7 +117,7 @@ mod tests {
 
     fn panel(corners: Vec<DVec3>) -> Panel {
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-        Panel { offset: normal.dot(corners[0]), normal, corners }
+        Panel::new(corners, normal)
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! What of a polygon is seen from a point past panels, exactly.
 //!
 //! Seen from x, a convex panel hides of a target what lies beyond its plane and within the planes through x and its
-//! edges. Cutting a convex polygon along these planes leaves convex pieces; those outside of any of them are visible.
-//! The form factor of what remains after all panels is a sum of Lambert's contour integrals (1760).
+//! edges: a convex polygon again. With V(T, k) the form factor of what the first k panels leave of T, and T_k the part of T
+//! that panel k hides, V(T, k) = Λ(T) − Σ_{m ≤ k} V(T_m, m − 1): each panel takes away what none before it has
+//! taken. Λ is Lambert's contour integral (1760).
 
 use super::panel::Panel;
 use glam::DVec3;
@@ -14,104 +15,106 @@ pub type Loop = SmallVec<[DVec3; 10]>;
 /// Heights below this are taken for zero, relative to the largest of the polygon: cuts along an edge leave no slivers.
 const ROUNDING: f64 = 1e-12;
 
-/// Pieces of polygons, kept from call to call.
+/// What a panel hides from a point: all that has positive heights over these planes.
+type Shadow = SmallVec<[(DVec3, f64); 6]>;
+
+/// The shadows of panels as a point throws them.
 #[derive(Default)]
-pub struct Pieces {
-    visible: Vec<Loop>,
-    next: Vec<Loop>,
+pub struct Shadows {
+    of: Vec<Shadow>,
 }
 
-impl Pieces {
+impl Shadows {
     /// F from the differential area at `x` with unit `normal` to what is visible of the convex polygon `target`, which lies
     /// above its horizon and faces it; and whether any panel hid anything. Panels within `touch` of x hide nothing.
     pub fn factor(&mut self, x: DVec3, normal: DVec3, target: &[DVec3], panels: &[&Panel], touch: f64) -> (f64, bool) {
-        self.visible.clear();
-        self.visible.push(target.iter().copied().collect());
-        let mut hidden = false;
+        self.of.clear();
         for panel in panels {
-            hidden |= self.hide(x, panel, touch);
-            if self.visible.is_empty() {
-                return (0.0, true);
-            }
-        }
-        (self.visible.iter().map(|piece| lambert(x, normal, piece)).sum(), hidden)
-    }
-
-    /// Takes away what a panel hides; whether it hid anything.
-    fn hide(&mut self, x: DVec3, panel: &Panel, touch: f64) -> bool {
-        let height = panel.height(x);
-        if height.abs() <= touch {
-            return false;
-        }
-        let side = -height.signum();
-        // Planes that bound what is hidden: positive heights within.
-        let mut planes: SmallVec<[(DVec3, f64); 9]> = SmallVec::new();
-        planes.push((side * panel.normal, side * panel.offset));
-        let corners = &panel.corners;
-        for (i, corner) in corners.iter().enumerate() {
-            let next = corners[(i + 1) % corners.len()];
-            let normal = side * (*corner - x).cross(next - x);
-            planes.push((normal, normal.dot(x)));
-        }
-        let mut hidden = false;
-        self.next.clear();
-        for piece in self.visible.drain(..) {
-            let outside = |(normal, offset): &(DVec3, f64)| {
-                let heights = || piece.iter().map(|p| normal.dot(*p) - offset);
-                let reach = ROUNDING * heights().fold(0.0, |m: f64, h| m.max(h.abs()));
-                heights().all(|h| h <= reach)
-            };
-            if planes.iter().any(outside) {
-                self.next.push(piece);
+            let height = panel.height(x);
+            if height.abs() <= touch {
                 continue;
             }
-            let mut left = piece;
-            for &(normal, offset) in &planes {
-                let (within, without) = cut(&left, normal, offset);
-                if without.len() >= 3 {
-                    self.next.push(without);
-                }
-                left = within;
-                if left.len() < 3 {
-                    break;
-                }
+            let side = -height.signum();
+            let mut planes = Shadow::new();
+            planes.push((side * panel.normal, side * panel.offset));
+            let corners = &panel.corners;
+            let mut corner = corners[corners.len() - 1] - x;
+            for next in corners {
+                let next = *next - x;
+                let normal = side * corner.cross(next);
+                planes.push((normal, normal.dot(x)));
+                corner = next;
             }
-            hidden |= left.len() >= 3;
+            self.of.push(planes);
         }
-        std::mem::swap(&mut self.visible, &mut self.next);
-        hidden
+        let whole = lambert(x, normal, target);
+        let hidden = hidden(x, normal, target, &self.of);
+        ((whole - hidden).max(0.0), hidden > 0.0)
     }
 }
 
-/// The parts of a convex polygon above and below a plane.
-pub fn cut(polygon: &[DVec3], normal: DVec3, offset: f64) -> (Loop, Loop) {
-    let (mut above, mut below) = (Loop::new(), Loop::new());
-    let heights: SmallVec<[f64; 10]> = polygon.iter().map(|p| normal.dot(*p) - offset).collect();
-    let reach = ROUNDING * heights.iter().fold(0.0, |m: f64, h| m.max(h.abs()));
-    let (mut has_above, mut has_below) = (false, false);
-    for (i, (&p, &h)) in polygon.iter().zip(&heights).enumerate() {
-        let k = (i + 1) % polygon.len();
-        if h >= -reach {
-            above.push(p);
-            has_above |= h > reach;
+/// The form factor of what shadows hide of a polygon.
+fn hidden(x: DVec3, normal: DVec3, target: &[DVec3], shadows: &[Shadow]) -> f64 {
+    let mut sum = 0.0;
+    for (k, shadow) in shadows.iter().enumerate() {
+        if let Some(part) = within(target, shadow) {
+            sum += lambert(x, normal, &part) - hidden(x, normal, &part, &shadows[..k]);
         }
-        if h <= reach {
-            below.push(p);
-            has_below |= h < -reach;
+    }
+    sum
+}
+
+/// The part of a convex polygon within a shadow; `None` where there is none.
+fn within(polygon: &[DVec3], shadow: &Shadow) -> Option<Loop> {
+    let is_outside = |(normal, offset): &(DVec3, f64)| {
+        let (mut low, mut high) = (0.0f64, 0.0f64);
+        for p in polygon {
+            let h = normal.dot(*p) - offset;
+            (low, high) = (low.min(h), high.max(h));
+        }
+        high <= ROUNDING * high.max(-low)
+    };
+    if shadow.iter().any(is_outside) {
+        return None;
+    }
+    let mut part: Loop = polygon.iter().copied().collect();
+    for &(normal, offset) in shadow {
+        if !keep_above(&mut part, normal, offset) {
+            return None;
+        }
+    }
+    Some(part)
+}
+
+/// Cuts off what lies below a plane; whether anything is left.
+pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
+    let mut heights: SmallVec<[f64; 10]> = SmallVec::new();
+    let (mut low, mut high) = (0.0f64, 0.0f64);
+    for p in &*polygon {
+        let h = normal.dot(*p) - offset;
+        (low, high) = (low.min(h), high.max(h));
+        heights.push(h);
+    }
+    let reach = ROUNDING * high.max(-low);
+    if high <= reach {
+        return false;
+    }
+    if low >= -reach {
+        return true;
+    }
+    let n = polygon.len();
+    let mut kept = Loop::new();
+    for (i, (&p, &h)) in polygon.iter().zip(&heights).enumerate() {
+        let k = if i + 1 == n { 0 } else { i + 1 };
+        if h >= -reach {
+            kept.push(p);
         }
         if (h > reach && heights[k] < -reach) || (h < -reach && heights[k] > reach) {
-            let crossing = p + h / (h - heights[k]) * (polygon[k] - p);
-            above.push(crossing);
-            below.push(crossing);
+            kept.push(p + h / (h - heights[k]) * (polygon[k] - p));
         }
     }
-    if !has_above {
-        above.clear();
-    }
-    if !has_below {
-        below.clear();
-    }
-    (above, below)
+    *polygon = kept;
+    polygon.len() >= 3
 }
 
 /// Lambert's contour integral of a polygon above the horizon whose corners run counter-clockwise about its own normal,
