@@ -5,6 +5,7 @@
 //! `visible`). The exchange area A_i F_ij is stored once per pair, so reciprocity holds by storage; what the rows lack
 //! of one is therefore an honest measure of the error, and is reported before any repair (`closure`).
 
+mod adaptive;
 mod clear;
 mod closure;
 mod cluster;
@@ -85,6 +86,9 @@ impl Choices {
 /// Distance below which points lie on a plane, relative to the diagonal of the scene: what single precision leaves of
 /// coordinates. Sheets closer than this block each other no more.
 const TOUCH: f64 = 5e-7;
+
+/// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
+const WHOLE: f64 = 0.05;
 
 /// Parts of a block: one task, and the pairs that share the first look at the panels.
 const BLOCK: usize = 32;
@@ -220,7 +224,9 @@ impl Walk<'_> {
             }
         }
         let least = a.shape.area().min(b.shape.area());
-        let (whole, order) = clear(a, b, self.options.clear_accuracy * least, cut);
+        // Past panels the whole is asked for no more exactly than what is left of it.
+        let accuracy = if panels.is_empty() { self.options.clear_accuracy } else { WHOLE * self.options.accuracy };
+        let (whole, order) = clear(a, b, accuracy * least, cut);
         let exchange = if panels.is_empty() {
             match order {
                 0 => self.choices.clear_closed_form += 1,
@@ -229,7 +235,7 @@ impl Walk<'_> {
             whole
         } else {
             self.choices.clipped += 1;
-            mixed(&mut self.shadows, [a, b], &panels, whole, self.options.accuracy * least, self.touch).0
+            mixed(&mut self.shadows, [a, b], &panels, whole, self.options.accuracy * least, self.touch)
         };
         if exchange.value > 0.0 || exchange.error > 0.0 {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));

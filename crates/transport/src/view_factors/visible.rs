@@ -26,8 +26,8 @@ pub struct Shadows {
 
 impl Shadows {
     /// F from the differential area at `x` with unit `normal` to what is visible of the convex polygon `target`, which lies
-    /// above its horizon and faces it; and whether any panel hid anything. Panels within `touch` of x hide nothing.
-    pub fn factor(&mut self, x: DVec3, normal: DVec3, target: &[DVec3], panels: &[&Panel], touch: f64) -> (f64, bool) {
+    /// above its horizon and faces it, and to what is hidden. Panels within `touch` of x hide nothing.
+    pub fn factor(&mut self, x: DVec3, normal: DVec3, target: &[DVec3], panels: &[&Panel], touch: f64) -> [f64; 2] {
         self.of.clear();
         for panel in panels {
             let height = panel.height(x);
@@ -49,7 +49,7 @@ impl Shadows {
         }
         let whole = lambert(x, normal, target);
         let hidden = hidden(x, normal, target, &self.of);
-        ((whole - hidden).max(0.0), hidden > 0.0)
+        [(whole - hidden).max(0.0), hidden]
     }
 }
 

@@ -1,0 +1,214 @@
+//! The default view factors of whole enclosures: against closed forms and references with blockers, and by the laws.
+
+use glam::DVec3;
+use radiosity_scene::{Enclosure, Facet};
+use radiosity_transport::view_factors::{ViewFactorOptions, ViewFactors, view_factors};
+use serde_json::Value;
+
+fn solve(enclosure: &Enclosure, accuracy: f64) -> ViewFactors {
+    view_factors(enclosure, &ViewFactorOptions { accuracy, ..ViewFactorOptions::default() }, &()).unwrap()
+}
+
+fn facet(corners: &[[f64; 3]]) -> Facet {
+    Facet::new(corners.iter().map(|c| DVec3::from(*c)).collect()).unwrap()
+}
+
+/// The sides of a box in patches of n × n, active inwards or outwards.
+fn add_box(enclosure: &mut Enclosure, low: [f64; 3], high: [f64; 3], n: usize, inwards: bool) {
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for (upper, at) in [(false, low[axis]), (true, high[axis])] {
+            for k in 0..n * n {
+                let point = |i: usize, j: usize| {
+                    let mut p = [0.0; 3];
+                    p[axis] = at;
+                    p[u] = low[u] + (high[u] - low[u]) * i as f64 / n as f64;
+                    p[v] = low[v] + (high[v] - low[v]) * j as f64 / n as f64;
+                    p
+                };
+                let (i, j) = (k / n, k % n);
+                let mut corners = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
+                if upper == inwards {
+                    corners.reverse();
+                }
+                enclosure.add(format!("{axis}{upper}{k}"), facet(&corners));
+            }
+        }
+    }
+}
+
+fn obstructed_room(n: usize) -> Enclosure {
+    let mut room = Enclosure::default();
+    add_box(&mut room, [0.0; 3], [5.0, 4.0, 3.0], n, true);
+    add_box(&mut room, [1.0, 1.0, 0.4], [2.2, 1.8, 1.4], 1, false);
+    add_box(&mut room, [3.2, 2.2, 0.3], [3.9, 3.0, 2.1], 1, false);
+    room
+}
+
+/// Catalogue 20: faces of the unit cube.
+#[test]
+fn catalogue_20_cube() {
+    let mut cube = Enclosure::default();
+    add_box(&mut cube, [0.0; 3], [1.0; 3], 1, true);
+    let factors = solve(&cube, 1e-5);
+    for i in 0..6 {
+        for j in 0..6 {
+            let exact = if i == j { 0.0 } else if i / 2 == j / 2 { 0.199_824_895_698 } else { 0.200_043_776_075 };
+            assert!((factors.factor(i, j).value - exact).abs() < 1e-11, "{i} {j}: {:?}", factors.factor(i, j));
+        }
+    }
+    assert!(factors.closure().largest < 1e-11);
+}
+
+/// Catalogue 0b: in a closed enclosure rows sum to one, whatever is clear to the accuracy of what is clear, with boxes
+/// in the way to that of what is not; and closer as the accuracy asked is finer.
+#[test]
+fn catalogue_0b_rows_sum_to_one() {
+    let mut empty = Enclosure::default();
+    add_box(&mut empty, [0.0; 3], [5.0, 4.0, 3.0], 6, true);
+    assert!(solve(&empty, 1e-5).closure().largest < 1e-7);
+
+    let room = obstructed_room(6);
+    let mut last = f64::INFINITY;
+    for accuracy in [1e-4, 1e-5, 1e-6] {
+        let closure = solve(&room, accuracy).closure();
+        assert!(closure.rms < 10.0 * accuracy && closure.rms < last, "{accuracy:e}: {closure:?}");
+        last = closure.rms;
+    }
+}
+
+/// Catalogue 18: two unit squares 1 apart, a half-size square midway; never more than without it.
+#[test]
+fn catalogue_18_a_square_between_squares() {
+    for (at, exact) in [(0.0, 0.149_868_671_8), (0.25, 0.099_506_294_6)] {
+        let mut pair = Enclosure::default();
+        pair.add("floor", facet(&[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]));
+        pair.add("ceiling", facet(&[[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]]));
+        let (a, b) = (at, at + 0.5);
+        pair.obstructions.push(facet(&[[a, a, 0.5], [b, a, 0.5], [b, b, 0.5], [a, b, 0.5]]));
+        for accuracy in [1e-3, 1e-4, 1e-5, 1e-6] {
+            let factor = solve(&pair, accuracy).factor(0, 1);
+            let off = (factor.value - exact).abs();
+            assert!(off <= factor.error && factor.error <= 1.01 * accuracy, "{accuracy:e}: {factor:?}, off {off:e}");
+            assert!(factor.value <= 0.199_824_895_7);
+        }
+    }
+}
+
+fn polygons(list: &Value) -> Option<Vec<Facet>> {
+    let polygon = |p: &Value| {
+        let corners: Vec<[f64; 3]> = serde_json::from_value(p["vertices"].clone()).ok()?;
+        (p["type"] == "polygon").then(|| facet(&corners))
+    };
+    list.as_array()?.iter().map(polygon).collect()
+}
+
+/// Every planar reference with blockers, decade by decade: the stated error holds the true one and meets the asked one.
+#[test]
+fn catalogue_18_references_with_blockers() {
+    let data: Value = serde_json::from_str(include_str!("data/view_factors_occluded.json")).unwrap();
+    let mut cases = 0;
+    for case in data["cases"].as_array().unwrap() {
+        let (Some(surfaces), Some(blockers)) = (polygons(&case["surfaces"]), polygons(&case["blockers"])) else {
+            continue;
+        };
+        cases += 1;
+        let mut enclosure = Enclosure { obstructions: blockers, ..Enclosure::default() };
+        surfaces.into_iter().for_each(|s| enclosure.add("", s));
+        let (id, truth) = (case["id"].as_str().unwrap(), case["value"].as_f64().unwrap());
+        for accuracy in [1e-3, 1e-4, 1e-5, 1e-6] {
+            let factor = solve(&enclosure, accuracy).factor(0, 1);
+            let off = (factor.value - truth).abs();
+            assert!(off <= factor.error + 1e-9, "{id} at {accuracy:e}: off by {off:e}, {factor:?}");
+            assert!(factor.error <= 1.01 * accuracy, "{id} at {accuracy:e}: {factor:?}");
+        }
+    }
+    assert_eq!(cases, 8);
+}
+
+/// Unoccluded references to 1e-8, by the default.
+#[test]
+fn catalogue_21_references_without_blockers() {
+    let data: Value = serde_json::from_str(include_str!("data/view_factors.json")).unwrap();
+    let mut cases = 0;
+    for case in data["cases"].as_array().unwrap() {
+        let Some(surfaces) = polygons(&case["surfaces"]).filter(|s| s.len() == 2) else { continue };
+        cases += 1;
+        let mut enclosure = Enclosure::default();
+        surfaces.into_iter().for_each(|s| enclosure.add("", s));
+        let factor = solve(&enclosure, 1e-5).factor(0, 1);
+        let off = (factor.value - case["value"].as_f64().unwrap()).abs();
+        assert!(off < 1e-8, "{}: off by {off:e}", case["id"]);
+    }
+    assert!(cases >= 15, "{cases}");
+}
+
+/// Catalogue 8: A_i F_ij = A_j F_ji bit for bit in what is stored, and within rounding in what is handed out.
+#[test]
+fn catalogue_8_reciprocity_by_storage() {
+    let factors = solve(&obstructed_room(3), 1e-4);
+    let dense = factors.dense();
+    let n = factors.len();
+    for i in 0..n {
+        for j in 0..n {
+            let (a, b) = (factors.areas()[i] * dense[i * n + j], factors.areas()[j] * dense[j * n + i]);
+            assert!((a - b).abs() <= 1e-15 * a.abs(), "{i} {j}: {a} {b}");
+        }
+    }
+    let (starts, columns, values) = factors.csr();
+    for i in 0..n {
+        let row = starts[i]..starts[i + 1];
+        assert!(columns[row.clone()].is_sorted());
+        for k in row {
+            assert_eq!(values[k], dense[i * n + columns[k] as usize]);
+        }
+    }
+}
+
+/// The repair closes rows by moving uncertain entries, and leaves the others as they are.
+#[test]
+fn the_repair_moves_what_is_uncertain() {
+    let room = obstructed_room(4);
+    let raw = solve(&room, 1e-4);
+    let mut closed = raw.clone();
+    let repair = closed.repair();
+    assert!(repair.before.rms > 1e-6 && repair.after.largest < 1e-12, "{repair:?}");
+    for i in 0..raw.len() {
+        for j in 0..raw.len() {
+            let (before, after) = (raw.factor(i, j), closed.factor(i, j));
+            let moved = (after.value - before.value).abs();
+            assert!(moved <= 5.0 * before.error + 1e-15, "{i} {j}: {before:?} {after:?}");
+        }
+    }
+}
+
+/// The same bytes on any number of threads.
+#[test]
+fn threads_do_not_matter() {
+    let room = obstructed_room(4);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| solve(&room, 1e-4).dense())
+    };
+    assert_eq!(on(1), on(3));
+}
+
+/// A room shaped like an L whose floor and ceiling are concave polygons.
+#[test]
+fn concave_facets_take_part() {
+    let outline = [[0., 0.], [2., 0.], [2., 1.], [1., 1.], [1., 3.], [0., 3.]];
+    let mut room = Enclosure::default();
+    let at = |z: f64| outline.map(|[x, y]| [x, y, z]);
+    let mut ceiling = at(1.0);
+    ceiling.reverse();
+    room.add("floor", facet(&at(0.0)));
+    room.add("ceiling", facet(&ceiling));
+    for i in 0..6 {
+        let ([ax, ay], [bx, by]) = (outline[i], outline[(i + 1) % 6]);
+        room.add("wall", facet(&[[bx, by, 0.], [ax, ay, 0.], [ax, ay, 1.], [bx, by, 1.]]));
+    }
+    let factors = solve(&room, 1e-6);
+    for i in 0..8 { println!("{i} {:?}", (0..8).map(|j| format!("{:.6} {:.0e}", factors.factor(i, j).value, factors.factor(i, j).error)).collect::<Vec<_>>()); }
+    println!("{:?} {:?}", factors.row_sums(), factors.choices);
+    assert!(factors.closure().largest < 1e-5, "{:?}", factors.closure());
+}
