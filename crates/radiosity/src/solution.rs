@@ -42,7 +42,7 @@ impl Default for SolveOptions {
             variation: 0.05,
             rays: 64,
             shadowing: Shadowing { places: 8, rays: 2 },
-            solver: Params { tolerance: 1e-4, max_steps: 500 },
+            solver: Params { tolerance: 1e-4, ..Params::default() },
             memory: 4 << 30,
         }
     }

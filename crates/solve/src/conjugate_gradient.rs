@@ -4,7 +4,8 @@
 //! converge. Entries with ρ = 0 are known beforehand (B = E there) and kept fixed. Hestenes and Stiefel 1952;
 //! all bands run side by side with their own step lengths.
 
-use crate::{Go, Info, Params, Response, SolveError, Transport, bound, is_done, residual};
+use crate::gauge::{Gauge, is_done, remainder};
+use crate::{Go, Info, Params, Response, SolveError, Transport};
 
 /// Solves B = E + R F B in place; `b` holds the start and the result. `step` sees each iterate.
 ///
@@ -23,7 +24,6 @@ pub fn conjugate_gradient<T: Transport>(
             "conjugate gradients need a reciprocal transport and a diagonal response; use Jacobi",
         ));
     };
-    let space = transport.space();
     let bands = response.bands();
     let n = b.len();
     let dot = |x: &[f64], y: &[f64]| {
@@ -42,12 +42,13 @@ pub fn conjugate_gradient<T: Transport>(
     }
     let (mut h, mut r, mut ap) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     transport.apply(b, &mut h, bands);
-    let mut info = Info { steps: 1, ..Info::default() };
-    info.residual = residual(space, response, (e, b, &h), &mut r);
+    remainder(response, (e, b, &h), &mut r);
+    let gauge = Gauge::new(transport, response, e);
+    let mut info = Info { steps: 1, work: 1.0, ..Info::default() };
     let mut p = r.clone();
     let mut rr = dot(&r, &r);
     loop {
-        info.bound = bound(response, &r);
+        gauge.enter(transport, &r, &mut info);
         if is_done(b, &info, params, &mut step)? {
             return Ok(info);
         }
@@ -55,6 +56,7 @@ pub fn conjugate_gradient<T: Transport>(
         // A p = p − R F p.
         transport.apply(&p, &mut h, bands);
         info.steps += 1;
+        info.work += 1.0;
         response.respond(&h, &mut ap);
         for (ap, p) in ap.iter_mut().zip(&p) {
             *ap = p - *ap;
@@ -70,11 +72,5 @@ pub fn conjugate_gradient<T: Transport>(
             p[i] = r[i] + ratio(next[i % bands], rr[i % bands]) * p[i];
         }
         rr = next;
-        let (own, scale) = (space_norm(space, &r, bands), space_norm(space, e, bands));
-        info.residual = own.iter().zip(scale).map(|(r, s)| crate::relative(*r, s)).collect();
     }
-}
-
-fn space_norm(space: &impl crate::Space, x: &[f64], bands: usize) -> Vec<f64> {
-    space.inner(x, x, bands).into_iter().map(f64::sqrt).collect()
 }

@@ -5,42 +5,96 @@
 //! inner product. Parameters go in, the field and an [`Info`] come out; not reaching the tolerance is an error that
 //! carries what was reached.
 
+mod bicgstab;
 mod conjugate_gradient;
-mod jacobi;
+mod deflated_jacobi;
+mod dense;
+mod direct;
+mod gauge;
+mod gmres;
+mod neumann;
+mod overshooting;
+mod plain_jacobi;
+mod progressive;
+mod random;
+mod random_walk;
+mod shot;
+mod solver;
+mod sor;
+mod southwell;
+mod sparse;
+mod stochastic_jacobi;
+mod substructure;
 mod traits;
 
+pub use bicgstab::bicgstab;
 pub use conjugate_gradient::conjugate_gradient;
-pub use jacobi::jacobi;
-pub use traits::{AreaSpace, DenseTransport, DiffuseResponse, Response, Space, Transport};
+pub use deflated_jacobi::jacobi;
+pub use dense::DenseTransport;
+pub use direct::{cholesky, lu};
+pub use gmres::gmres;
+pub use neumann::{bounces, neumann};
+pub use overshooting::overshooting;
+pub use plain_jacobi::plain_jacobi;
+pub use progressive::{progressive, shooting_ambient, shooting_cyclic};
+pub use random_walk::random_walk;
+pub use solver::{Solver, solve, solve_operator};
+pub use sor::{gauss_seidel, sor};
+pub use southwell::southwell;
+pub use sparse::SparseTransport;
+pub use stochastic_jacobi::stochastic_jacobi;
+pub use substructure::Substructure;
+pub use traits::{AreaSpace, DiffuseResponse, Response, Rows, Shoot, Space, Transport};
 
 use serde::Serialize;
 
-/// When to stop.
+/// When to stop, and what single solvers want to know.
 #[derive(Clone, Copy, Debug)]
 pub struct Params {
     /// The residual E + R F B − B, in the space's norm, relative to that of E, in every band. The default 1e-6 is a
     /// hundred times below what the transport's own error leaves visible.
     pub tolerance: f64,
-    /// Largest number of applications of the transport.
+    /// Largest amount of work, in applications of the transport ([`Info::work`]). It is looked at after each step, so that the
+    /// last one may go beyond it.
     pub max_steps: usize,
+    /// ω of `sor`. The default 1.1 is near the best where reflectances are around one half: 1.07 for two unknowns that keep
+    /// half, three sweeps instead of four in catalogue R1. White rooms would like more; from 2 on it diverges.
+    pub relaxation: f64,
+    /// Directions that `gmres` keeps before it begins anew, each two vectors of memory. Closed cubes need ten or less at any
+    /// reflectance; 30 leaves room for scenes of several rooms.
+    pub restart: usize,
+    /// Samples for each unknown in a step of a random method. With the default 64 a step costs as much as measuring its
+    /// residual where there are some hundred unknowns.
+    pub samples: usize,
+    /// What the random numbers come from: the same seed, the same answer.
+    pub seed: u64,
 }
 
 impl Default for Params {
     fn default() -> Self {
-        Params { tolerance: 1e-6, max_steps: 500 }
+        Params { tolerance: 1e-6, max_steps: 500, relaxation: 1.1, restart: 30, samples: 64, seed: 1 }
     }
 }
 
 /// What a solver did.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Info {
-    /// Applications of the transport.
+    /// Steps of the method: applications of the transport where they are the steps, sweeps, shots, or random runs.
     pub steps: usize,
-    /// Relative residual of each band at the end, in the space's norm.
+    /// What that cost, in applications of the transport, so that methods compare: a shot is one N-th of one, a random draw one N²-th,
+    /// the factors of an N × N matrix N/3 (Cholesky N/6).
+    pub work: f64,
+    /// Relative residual of each band, ‖E + R F B − B‖/‖E‖ in the space's norm. Of shooting it is that of the light that has been
+    /// shot: the unshot energy.
     pub residual: Vec<f64>,
-    /// Guaranteed bound of the largest error of B in each band: ‖r‖∞/(1 − ρ_max) (catalogue 35). It holds for the
-    /// discrete equation when no row of F sums to more than one.
+    /// Σ A r/Σ A E of each band for that residual r: the share of the emitted energy that is still to be shot.
+    pub unshot: Vec<f64>,
+    /// Guaranteed bound of the largest error of B in each band: ‖r‖∞/(1 − ρ_max ‖F‖∞) (catalogue 35), for the
+    /// discrete equation; infinite where that promises nothing. It rests on [`Transport::row_sum`].
     pub bound: Vec<f64>,
+    /// Standard error of each number of the field, for random methods; empty for others, infinite after one run.
+    #[serde(skip)]
+    pub standard_error: Vec<f64>,
 }
 
 /// Why a solver gave up.
@@ -60,6 +114,19 @@ pub enum SolveError {
     /// A solver was used where it has no right to converge.
     #[error("{0}")]
     NotApplicable(&'static str),
+    /// A reflectance with which no light comes to rest, or none at all.
+    #[error("reflectance {value} of unknown {unknown}, band {band}, is not between 0 and 1")]
+    Reflectance {
+        /// The unknown.
+        unknown: usize,
+        /// The band.
+        band: usize,
+        /// What was given.
+        value: f64,
+    },
+    /// No solver has this name.
+    #[error("no solver is called \"{0}\"; there are {known}", known = Solver::names())]
+    Unknown(String),
 }
 
 /// What a callback answers after each step.
@@ -69,58 +136,6 @@ pub enum Go {
     On,
     /// Stop now.
     Stop,
-}
-
-/// Residuals of a field: fills `residual` with E + R F B − B from `h = F b`, returns the relative norms by band.
-fn residual(
-    space: &impl Space,
-    response: &(impl Response + ?Sized),
-    (e, b, h): (&[f64], &[f64], &[f64]),
-    residual: &mut [f64],
-) -> Vec<f64> {
-    response.respond(h, residual);
-    for ((r, e), b) in residual.iter_mut().zip(e).zip(b) {
-        *r += e - b;
-    }
-    let bands = response.bands();
-    let (own, scale) = (space.inner(residual, residual, bands), space.inner(e, e, bands));
-    own.iter().zip(scale).map(|(r, s)| relative(r.sqrt(), s.sqrt())).collect()
-}
-
-/// The norm of a residual relative to that of the right-hand side; nothing is left of nothing.
-fn relative(residual: f64, scale: f64) -> f64 {
-    if residual == 0.0 { 0.0 } else { residual / scale.max(f64::MIN_POSITIVE) }
-}
-
-/// Shows the caller an iterate and says whether the solver is done with it.
-fn is_done(
-    b: &[f64],
-    info: &Info,
-    params: &Params,
-    step: &mut impl FnMut(&[f64], &Info) -> Go,
-) -> Result<bool, SolveError> {
-    if step(b, info) == Go::Stop {
-        return Err(SolveError::Stopped);
-    }
-    if info.residual.iter().all(|x| *x <= params.tolerance) {
-        return Ok(true);
-    }
-    if info.steps >= params.max_steps {
-        return Err(SolveError::NotConverged { info: info.clone(), asked: params.tolerance });
-    }
-    Ok(false)
-}
-
-/// The guaranteed bound ‖r‖∞/(1 − ρ_max) of each band.
-fn bound(response: &(impl Response + ?Sized), residual: &[f64]) -> Vec<f64> {
-    let bands = response.bands();
-    let largest = response.largest();
-    (0..bands)
-        .map(|band| {
-            let worst = residual.iter().skip(band).step_by(bands).fold(0f64, |m, r| m.max(r.abs()));
-            if largest[band] < 1.0 { worst / (1.0 - largest[band]) } else { f64::INFINITY }
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -1,7 +1,4 @@
-//! What solvers ask of the world: a space, a transport, a response; and the plainest of each.
-
-use crate::SolveError;
-use rayon::prelude::*;
+//! What solvers ask of the world: a space, a transport, a response; and the plainest space and response.
 
 /// A vector space with its own inner product.
 pub trait Space {
@@ -26,6 +23,23 @@ pub trait Transport: Sync {
     fn parts(&self) -> Option<&[u32]> {
         None
     }
+    /// ‖F‖∞, the largest sum of a row's absolute values: one in a closed scene, less in an open one. What sampling or
+    /// averaging left above one must be told here, for the guaranteed bound rests on it.
+    fn row_sum(&self) -> f64 {
+        1.0
+    }
+}
+
+/// A transport whose rows can be read: what sweeps, factorisations and random walks ask for.
+pub trait Rows: Transport {
+    /// Hands out the entries (j, F_ij) of row i in rising order of j; those left out are zero.
+    fn row(&self, i: usize, entry: impl FnMut(usize, f64));
+}
+
+/// A transport that can send the light of one unknown to all others: what Southwell and progressive refinement ask for.
+pub trait Shoot: Transport {
+    /// Writes into `h` what `unshot`, a radiosity by band of unknown `source` alone, brings to all: h_j = F_j,source unshot.
+    fn shoot(&self, source: usize, unshot: &[f64], h: &mut [f64]);
 }
 
 /// R: what surfaces make of the light that they receive.
@@ -36,6 +50,11 @@ pub trait Response: Sync {
     fn respond(&self, h: &[f64], b: &mut [f64]);
     /// Largest reflectance of each band: ‖R‖∞.
     fn largest(&self) -> Vec<f64>;
+    /// The reflectances by entry, if an unknown reflects into itself alone and bands do not mix. Solvers that take
+    /// single rows need it.
+    fn diagonal(&self) -> Option<&[f64]> {
+        None
+    }
     /// The weight (A/ρ by entry) in whose inner product I − R F is symmetric, if F is reciprocal and R diagonal; CG is
     /// offered only then.
     fn self_adjoint_weight(&self) -> Option<Vec<f64>>;
@@ -98,51 +117,14 @@ impl Response for DiffuseResponse {
             .collect()
     }
 
+    fn diagonal(&self) -> Option<&[f64]> {
+        Some(&self.reflectance)
+    }
+
     fn self_adjoint_weight(&self) -> Option<Vec<f64>> {
         let area = self.reciprocal_area.as_ref()?;
         // Where nothing is reflected the unknown is known (B = E) and takes no part in the inner product.
         let weight = |(i, &rho): (usize, &f64)| if rho > 0.0 { area[i / self.bands] / rho } else { 0.0 };
         Some(self.reflectance.iter().enumerate().map(weight).collect())
-    }
-}
-
-/// A full matrix of form factors, row by row: F_ij is the share of what leaves i that reaches j, and equally the
-/// weight of b_j in h_i.
-#[derive(Clone, Debug)]
-pub struct DenseTransport {
-    space: AreaSpace,
-    rows: Vec<f64>,
-}
-
-impl DenseTransport {
-    /// From areas and the N × N factors, row-major.
-    ///
-    /// # Errors
-    /// If the number of factors is not the square of the number of areas.
-    pub fn new(area: Vec<f64>, rows: Vec<f64>) -> Result<DenseTransport, SolveError> {
-        if rows.len() != area.len() * area.len() {
-            return Err(SolveError::NotApplicable("a form-factor matrix needs as many rows and columns as areas"));
-        }
-        Ok(DenseTransport { space: AreaSpace { area }, rows })
-    }
-}
-
-impl Transport for DenseTransport {
-    type Space = AreaSpace;
-
-    fn space(&self) -> &AreaSpace {
-        &self.space
-    }
-
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
-        let n = self.space.dim();
-        h.par_chunks_exact_mut(bands).zip(self.rows.par_chunks_exact(n.max(1))).for_each(|(h, row)| {
-            h.fill(0.0);
-            for (factor, b) in row.iter().zip(b.chunks_exact(bands)) {
-                for (h, b) in h.iter_mut().zip(b) {
-                    *h += factor * b;
-                }
-            }
-        });
     }
 }

@@ -6,9 +6,11 @@
 //! each part of the scene that sees no other (a two-level method; Nicolaides 1987). One vector for all rooms together
 //! would pour a part of a bright room's error into a dark one. On a closed cube at ρ = 0.95 that takes 20 sweeps instead of 269.
 
-use crate::{Go, Info, Params, Response, SolveError, Space, Transport, bound, is_done, residual};
+use crate::gauge::{Gauge, is_done, remainder};
+use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
 
-/// Solves B = E + R F B in place; `b` holds the start (warm or zero) and the result. `step` sees each iterate.
+/// Solves B = E + R F B in place; `b` holds the start (warm or zero) and the result. `step` sees each iterate. This is
+/// the solver `deflated-jacobi` of the table; the textbook's is [`crate::plain_jacobi`].
 ///
 /// # Errors
 /// [`SolveError::NotConverged`] with the last iterate left in `b`; [`SolveError::Stopped`] if `step` says so.
@@ -44,10 +46,10 @@ pub fn jacobi<T: Transport>(
     let balance_of_v = balance(&kept);
 
     transport.apply(b, &mut h, bands);
-    let mut info = Info { steps: 2, ..Info::default() };
+    let gauge = Gauge::new(transport, response, e);
+    let mut info = Info { steps: 2, work: 2.0, ..Info::default() };
     loop {
-        info.residual = residual(space, response, (e, b, &h), &mut r);
-        info.bound = bound(response, &r);
+        gauge.measure(transport, response, (e, b, &h), &mut r, &mut info);
         if is_done(b, &info, params, &mut step)? {
             return Ok(info);
         }
@@ -58,9 +60,10 @@ pub fn jacobi<T: Transport>(
         }
         transport.apply(b, &mut h, bands);
         info.steps += 1;
+        info.work += 1.0;
 
         // Deflate: the share of v that balances the area integral of the new residual. F is linear, so h follows.
-        residual(space, response, (e, b, &h), &mut r);
+        remainder(response, (e, b, &h), &mut r);
         let lacking = balance(&r);
         for i in 0..n {
             let slot = part(i);

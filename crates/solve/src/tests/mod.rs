@@ -2,16 +2,16 @@
 
 use crate::*;
 
-/// The unit cube with one constant patch per face (catalogue 20): opposite 0.1998248957, adjacent 0.2000437761.
+mod direct;
+mod every_solver;
+mod iterations;
+mod random;
+mod shooting;
+mod substructuring;
+mod systems;
+
 fn cube() -> DenseTransport {
-    let opposite = 0.199_824_895_7;
-    let adjacent = (1.0 - opposite) / 4.0;
-    let mut rows = vec![adjacent; 36];
-    for i in 0..6 {
-        rows[6 * i + i] = 0.0;
-        rows[6 * i + (i ^ 1)] = opposite;
-    }
-    DenseTransport::new(vec![1.0; 6], rows).unwrap()
+    systems::cube(0.5).transport
 }
 
 fn response(rho: f64, n: usize) -> DiffuseResponse {
@@ -96,7 +96,15 @@ fn catalogue_35_bound_holds_at_every_step() {
         assert!(error <= info.bound[0] + 1e-12, "{error} > {}", info.bound[0]);
         Go::On
     };
-    jacobi(&transport, &response(0.8, 6), &e, &mut b, &Params { tolerance: 1e-9, max_steps: 100 }, check).unwrap();
+    jacobi(
+        &transport,
+        &response(0.8, 6),
+        &e,
+        &mut b,
+        &Params { tolerance: 1e-9, max_steps: 100, ..Params::default() },
+        check,
+    )
+    .unwrap();
 }
 
 /// Catalogue 0a: areas 1 and 100; a swapped index would be wrong by 10⁴. F_12 = 1 and F_21 = 0.01: the small patch
@@ -142,7 +150,7 @@ fn bands_are_independent() {
 #[test]
 fn running_out_of_steps_is_an_error_with_the_residual() {
     let mut b = vec![0.0; 6];
-    let params = Params { tolerance: 1e-12, max_steps: 4 };
+    let params = Params { tolerance: 1e-12, max_steps: 4, ..Params::default() };
     let e = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let error = jacobi(&cube(), &response(0.9, 6), &e, &mut b, &params, |_, _| Go::On).unwrap_err();
     assert!(matches!(&error, SolveError::NotConverged { info, .. } if info.residual[0] > 1e-12), "{error}");
