@@ -107,5 +107,5 @@ fn finish<T: Rows>(
     if is_done(b, &info, &Params { max_steps: usize::MAX, ..*params }, &mut step)? {
         return Ok(info);
     }
-    Err(SolveError::NotConverged { info, asked: params.tolerance })
+    Err(SolveError::NotConverged { info: Box::new(info), asked: params.tolerance })
 }

@@ -95,7 +95,7 @@ pub(crate) fn is_done(
         return Ok(true);
     }
     if info.work >= params.max_steps as f64 {
-        return Err(SolveError::NotConverged { info: info.clone(), asked: params.tolerance });
+        return Err(SolveError::NotConverged { info: Box::new(info.clone()), asked: params.tolerance });
     }
     Ok(false)
 }

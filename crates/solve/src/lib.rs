@@ -104,7 +104,7 @@ pub enum SolveError {
     #[error("not converged after {} steps: relative residual {:?}, asked for {asked:e}", info.steps, info.residual)]
     NotConverged {
         /// What was reached; the field holds the last iterate.
-        info: Info,
+        info: Box<Info>,
         /// The tolerance asked for.
         asked: f64,
     },

@@ -56,11 +56,11 @@ pub fn sor<T: Rows>(
 
     // What the first sweep finds: each half is read once, and a start from zero is not read at all.
     let cold = b.iter().all(|b| *b == 0.0);
-    for i in 0..unknowns {
+    for (i, own) in own.iter_mut().enumerate() {
         let at = i * bands;
         transport.row(i, |j, factor| {
             if j == i {
-                own[i] = factor;
+                *own = factor;
             } else if !cold {
                 let part = if j < i { &mut before } else { &mut beyond };
                 for band in 0..bands {
@@ -80,7 +80,7 @@ pub fn sor<T: Rows>(
         }
 
         // Sweep: the new values before the diagonal, the old ones beyond it.
-        for i in 0..unknowns {
+        for (i, own) in own.iter().enumerate() {
             let range = i * bands..(i + 1) * bands;
             let sum = &mut before[range.clone()];
             sum.fill(0.0);
@@ -92,7 +92,7 @@ pub fn sor<T: Rows>(
                 }
             });
             for k in range {
-                let relaxed = (e[k] + rho[k] * (before[k] + beyond[k])) / (1.0 - rho[k] * own[i]);
+                let relaxed = (e[k] + rho[k] * (before[k] + beyond[k])) / (1.0 - rho[k] * own);
                 b[k] = (1.0 - omega) * b[k] + omega * relaxed;
             }
         }

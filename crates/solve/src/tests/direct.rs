@@ -31,7 +31,7 @@ fn catalogue_31_elimination_of_two_thousand_unknowns() {
 #[test]
 fn catalogue_31_boxes_of_one_patch_a_face() {
     // Size, reflectance and exitance by face, radiosity by face.
-    let cases: [([f64; 3], [f64; 6], [f64; 6], [f64; 6]); 3] = [
+    let cases = [
         (
             [1.0, 1.0, 1.0],
             [0.5; 6],

@@ -162,29 +162,68 @@ fn catalogue_36_sweeps_of_r1() {
     }
 }
 
-/// Iterations to an error of 1e-6 on a closed cube of 600 patches, all faces alike, one emitting: Jacobi and Gauss–Seidel
-/// lose the constant at the rate of ρ; Krylov methods and deflation do not care.
+/// A closed cube of 600 patches, all of reflectance ρ, with an emission without pattern.
+fn closed_cube(rho: f64) -> System {
+    let pattern = |c: [f64; 3]| {
+        let phase = c[0] * 12_989.8 + c[1] * 7_823.3 + c[2] * 3_771.9;
+        (4375.5 * phase.sin()).rem_euclid(1.0)
+    };
+    box_of([1.0; 3], 10).closed().system(|_| rho, |_, c| pattern(c))
+}
+
+/// Iterations from B = E to a relative error of 1e-6 on a closed cube of 600 patches, all alike, emission without pattern:
+/// Jacobi and Gauss–Seidel lose the constant at the rate of ρ; Krylov methods and deflation do not care.
 #[test]
 fn catalogue_8_iterations_on_a_closed_cube() {
-    let table = [
-        // ρ, Jacobi, Gauss–Seidel, conjugate gradients, deflated Jacobi, GMRES, BiCGSTAB
-        (0.5, [19, 11, 7]),
-        (0.8, [61, 32, 9]),
-        (0.95, [269, 136, 10]),
-    ];
-    for (rho, expected) in table {
-        let system = box_of([1.0; 3], 10).closed().system(|_| rho, |face, _| if face == 0 { 1.0 } else { 0.0 });
-        let params = Params { tolerance: 1e-6, max_steps: 3000, ..Params::default() };
-        let steps = |solver| system.solve(solver, &params).unwrap().1.steps;
-        let found = [Solver::Jacobi, Solver::GaussSeidel, Solver::Cg].map(steps);
-        eprintln!(
-            "{rho}: {found:?} {} {} {}",
-            steps(Solver::DeflatedJacobi),
-            steps(Solver::Gmres),
-            steps(Solver::Bicgstab)
-        );
-        for (found, expected) in found.iter().zip(expected) {
-            assert!((*found as f64 - f64::from(expected)).abs() <= 2.0 + 0.05 * f64::from(expected), "{rho}");
-        }
+    let solvers =
+        [Solver::Jacobi, Solver::GaussSeidel, Solver::Cg, Solver::DeflatedJacobi, Solver::Gmres, Solver::Bicgstab];
+    for (rho, expected) in [(0.5, [19, 11, 7]), (0.8, [61, 32, 9]), (0.95, [269, 136, 10]), (0.99, [1374, 688, 10])] {
+        let system = closed_cube(rho);
+        let exact = system.exact();
+        let found = solvers.map(|solver| {
+            let mut b = system.e.clone();
+            let mut count = 0i32;
+            let params = Params { tolerance: 0.0, max_steps: 3000, ..Params::default() };
+            let look = |b: &[f64], _: &Info| {
+                if system.error(b, &exact) < 1e-6 {
+                    return Go::Stop;
+                }
+                count += 1;
+                Go::On
+            };
+            let _ = solve(solver, &system.transport, &system.response, &system.e, &mut b, &params, look);
+            count
+        });
+        let [jacobi, seidel, cg, deflated, gmres, bicgstab] = found;
+        assert_eq!([jacobi, seidel], expected[..2], "{rho}");
+        // Another emission may ask one step more of conjugate gradients, or one less.
+        assert!((cg - expected[2]).abs() <= 1, "{rho}: {cg}");
+        assert!(deflated <= 12 && gmres <= cg && bicgstab <= 8, "{rho}: {found:?}");
+    }
+}
+
+/// Catalogue 39: what shooting costs to an error of 1 % on the same cube, in applications of F: 2.7, 9.7 and 44 were measured
+/// elsewhere. Overshooting takes a sweep or two instead.
+#[test]
+fn catalogue_39_shots_on_a_closed_cube() {
+    for (rho, expected) in [(0.5, 2.7), (0.8, 9.7), (0.95, 44.0)] {
+        let system = closed_cube(rho);
+        let exact = system.exact();
+        let [plain, over] = [Solver::Progressive, Solver::Overshooting].map(|solver| {
+            let mut b = vec![0.0; 600];
+            let mut work = 0.0;
+            let mut last = 1;
+            let look = |b: &[f64], info: &Info| {
+                work = info.work;
+                // A look at every tenth shot tells the work to 0.02.
+                last = (last + 1) % 10;
+                if last == 0 && system.error(b, &exact) < 0.01 { Go::Stop } else { Go::On }
+            };
+            let _ = solve(solver, &system.transport, &system.response, &system.e, &mut b, &Params::default(), look);
+            work
+        });
+        eprintln!("{rho}: {plain} {over}");
+        assert!((plain - expected).abs() <= 0.05 + 0.02 * expected, "{rho}: {plain}");
+        assert!(over < 2.5, "{rho}: {over}");
     }
 }

@@ -74,7 +74,7 @@ struct Run {
 fn shoot(system: &System, exact: &[f64], solver: Solver) -> Run {
     let mut run = Run { unshot: [0.0; 2], after_four: 0.0, reached: [0; 2], b: vec![0.0; exact.len()] };
     let mut b = vec![0.0; exact.len()];
-    let params = Params { tolerance: 2e-3, ..Params::default() };
+    let params = Params { tolerance: 5e-4, ..Params::default() };
     let look = |b: &[f64], info: &Info| {
         // Until 0.1 % is reached; beyond that every shot alike.
         let error = if run.reached[1] == 0 { system.error(b, exact) } else { 0.0 };
@@ -97,7 +97,7 @@ fn shoot(system: &System, exact: &[f64], solver: Solver) -> Run {
 
 /// Catalogue 39, 40, 41: reference run R1, shot by shot.
 #[test]
-fn catalogue_40_reference_run() {
+fn catalogue_39_40_41_reference_run() {
     let system = r1();
     let exact = system.exact();
     let sorted = shoot(&system, &exact, Solver::Progressive);
@@ -121,8 +121,8 @@ fn catalogue_40_reference_run() {
     assert_eq!(ambient.reached[0], 3);
     assert_eq!(ambient.b, sorted.b);
 
-    // Overshooting: a third of the shots.
-    assert!(over.reached[1] < 1000, "{:?}", over.reached);
+    // Overshooting: 0.1 % after a third of the shots, 0.99 sweeps.
+    assert_eq!(over.reached, [525, 857]);
 }
 
 /// Bands travel together: what shoots is decided by the energy of all, and each band ends where it would alone.
