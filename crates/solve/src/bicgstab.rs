@@ -1,8 +1,9 @@
 //! BiCGSTAB: a Krylov method for systems that are not symmetric (van der Vorst 1992).
 //!
-//! For a table of hit ids, a mixing response, patches with elements. Two applications of F a step and seven vectors, whatever
-//! the number of steps. Its residual does not fall evenly, and it can break down: a band whose shadow residual becomes orthogonal to
-//! the residual begins anew from where it is. All bands run side by side with their own coefficients, in the space's inner product.
+//! For a table of hit ids, a mixing response, patches with elements. Two applications of F a step and seven vectors,
+//! whatever the number of steps. Its residual does not fall evenly, and it can break down: a band whose shadow
+//! residual becomes orthogonal to the residual begins anew from where it is. All bands run side by side with their
+//! own coefficients, in the space's inner product.
 
 use crate::gauge::{Gauge, begin, is_done, remainder};
 use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
@@ -10,7 +11,8 @@ use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
 /// |⟨r̂, r⟩| below this share of ‖r̂‖‖r‖ is a breakdown: √ε leaves half the digits to the coefficients that follow.
 const BREAKDOWN: f64 = 1.5e-8;
 
-/// Solves B = E + R F B in place; `b` holds the start and the result. `step` sees the field after each pair of applications.
+/// Solves B = E + R F B in place; `b` holds the start and the result. `step` sees the field after each pair of
+/// applications.
 ///
 /// # Errors
 /// As [`crate::plain_jacobi`].

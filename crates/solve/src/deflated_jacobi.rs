@@ -2,9 +2,10 @@
 //!
 //! Plain Jacobi (gathering) loses one factor ρ per sweep, because one error mode, the constant irradiance, decays as
 //! slowly as ρ̄; all others die at about half that rate (a closed cube has eigenvalues 1, 0.51, …). After each sweep
-//! the multiple c of v = R 1 that makes the residual's area integral vanish is added: a coarse space of one vector for
-//! each part of the scene that sees no other (a two-level method; Nicolaides 1987). One vector for all rooms together
-//! would pour a part of a bright room's error into a dark one. On a closed cube at ρ = 0.95 that takes 20 sweeps instead of 269.
+//! the multiple c of v = R 1 that makes the residual's area integral vanish is added: a coarse space of one vector
+//! for each part of the scene that sees no other (a two-level method; Nicolaides 1987). One vector for all rooms
+//! together would pour a part of a bright room's error into a dark one. On a closed cube at ρ = 0.95 that takes 20
+//! sweeps instead of 269.
 
 use crate::gauge::{Gauge, is_done, remainder};
 use crate::{Go, Info, Params, Response, SolveError, Space, Transport};

@@ -1,14 +1,15 @@
 //! F as a full matrix of form factors, row by row (Goral et al. 1984).
 //!
-//! F_ij is the share of what leaves i that reaches j, and equally the weight of b_j in h_i. It takes 8 N² bytes: 800 MB for ten
-//! thousand unknowns.
+//! F_ij is the share of what leaves i that reaches j, and equally the weight of b_j in h_i. It takes 8 N² bytes: 800
+//! MB for ten thousand unknowns.
 
 use crate::{AreaSpace, Rows, Shoot, SolveError, Space, Transport};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Largest |A_i F_ij − A_j F_ji|, relative to the larger of the two, at which a column is still read as a row by
-/// reciprocity. It is rounding in double precision; with a looser one, shooting would solve another equation than gathering.
+/// reciprocity. It is rounding in double precision; with a looser one, shooting would solve another equation than
+/// gathering.
 pub(crate) const RECIPROCAL: f64 = 1e-12;
 
 /// A full matrix of form factors.

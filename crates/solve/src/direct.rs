@@ -1,9 +1,10 @@
-//! The full matrix method: elimination, with LU or Cholesky factors (catalogue 31; Goral, Torrance, Greenberg & Battaile 1984).
+//! The full matrix method: elimination, with LU or Cholesky factors (catalogue 31; Goral, Torrance, Greenberg &
+//! Battaile 1984).
 //!
 //! LU with partial pivoting solves (I − R F) B = E as it stands. Cholesky takes the symmetric form (catalogue 8),
-//! (A_i/ρ_i) B_i − Σ_j A_i F_ij B_j = A_i E_i/ρ_i, at half the cost; black unknowns, known beforehand, go to the right-hand side.
-//! Both need 8 N² bytes and N³ time for each band, N/3 and N/6 applications of F, and serve as the oracle of all others. A
-//! start is of no use to them. The factors are faer's.
+//! (A_i/ρ_i) B_i − Σ_j A_i F_ij B_j = A_i E_i/ρ_i, at half the cost; black unknowns, known beforehand, go to the
+//! right-hand side. Both need 8 N² bytes and N³ time for each band, N/3 and N/6 applications of F, and serve as the
+//! oracle of all others. A start is of no use to them. The factors are faer's.
 
 use crate::gauge::{Gauge, is_done};
 use crate::{Go, Info, Params, Response, Rows, SolveError, Space};
@@ -43,8 +44,8 @@ pub fn lu<T: Rows>(
 /// Cholesky factors of the symmetric form; `b` receives the result.
 ///
 /// # Errors
-/// [`SolveError::NotApplicable`] if the response is not self-adjoint or the symmetric form not positive definite; otherwise
-/// as [`crate::plain_jacobi`].
+/// [`SolveError::NotApplicable`] if the response is not self-adjoint or the symmetric form not positive definite;
+/// otherwise as [`crate::plain_jacobi`].
 pub fn cholesky<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),

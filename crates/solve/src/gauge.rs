@@ -1,8 +1,8 @@
 //! How far an iterate is from the solution: the one residual and the one bound that all solvers report.
 //!
-//! The residual of B is r = E + R F B − B, its size the space's norm of r relative to that of E, band by band. The error
-//! obeys (I − R F)(B* − B) = r, hence ‖B* − B‖∞ ≤ ‖r‖∞/(1 − ρ_max ‖F‖∞) (catalogue 35): guaranteed, and infinite where
-//! ρ_max ‖F‖∞ ≥ 1 promises nothing.
+//! The residual of B is r = E + R F B − B, its size the space's norm of r relative to that of E, band by band. The
+//! error obeys (I − R F)(B* − B) = r, hence ‖B* − B‖∞ ≤ ‖r‖∞/(1 − ρ_max ‖F‖∞) (catalogue 35): guaranteed, and
+//! infinite where ρ_max ‖F‖∞ ≥ 1 promises nothing.
 
 use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
 

@@ -1,10 +1,11 @@
-//! GMRES(m): the smallest residual over the Krylov space, begun anew every m steps (Saad & Schultz 1986), in the form of
-//! generalised conjugate residuals (Eisenstat, Elman & Schultz 1983).
+//! GMRES(m): the smallest residual over the Krylov space, begun anew every m steps (Saad & Schultz 1986), in the form
+//! of generalised conjugate residuals (Eisenstat, Elman & Schultz 1983).
 //!
 //! Both forms give the same iterates where the symmetric part of I − R F is positive definite; this one has field and
-//! residual at hand after each step, for 2 m vectors instead of m. Each direction's image A p_k is made orthogonal to those
-//! before, and B and r move along to where ‖r‖ is least, so the residual never grows. It can stand still where the symmetric part
-//! is indefinite, which needs ρ and areas far from each other; bicgstab is the way out. One application of F a step.
+//! residual at hand after each step, for 2 m vectors instead of m. Each direction's image A p_k is made orthogonal to
+//! those before, and B and r move along to where ‖r‖ is least, so the residual never grows. It can stand still where
+//! the symmetric part is indefinite, which needs ρ and areas far from each other; bicgstab is the way out. One
+//! application of F a step.
 
 use crate::gauge::{Gauge, begin, is_done, remainder};
 use crate::{Go, Info, Params, Response, SolveError, Space, Transport};

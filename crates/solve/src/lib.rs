@@ -4,6 +4,10 @@
 //! A solver asks for the smallest trait it needs: [`Transport`] gives h = F b, [`Response`] gives R h, [`Space`] the
 //! inner product. Parameters go in, the field and an [`Info`] come out; not reaching the tolerance is an error that
 //! carries what was reached.
+//!
+//! [`Solver`] names all solvers; [`solve`] runs any of them on a stored matrix ([`DenseTransport`],
+//! [`SparseTransport`]), [`solve_operator`] those that need no more than [`Transport`]. Each is a function of its
+//! own, too.
 
 mod bicgstab;
 mod conjugate_gradient;
@@ -54,14 +58,15 @@ pub struct Params {
     /// The residual E + R F B − B, in the space's norm, relative to that of E, in every band. The default 1e-6 is a
     /// hundred times below what the transport's own error leaves visible.
     pub tolerance: f64,
-    /// Largest amount of work, in applications of the transport ([`Info::work`]). It is looked at after each step, so that the
-    /// last one may go beyond it.
+    /// Largest amount of work, in applications of the transport ([`Info::work`]). It is looked at after each step, so
+    /// that the last one may go beyond it.
     pub max_steps: usize,
-    /// ω of `sor`. The default 1.1 is near the best where reflectances are around one half: 1.07 for two unknowns that keep
-    /// half, three sweeps instead of four in catalogue R1. White rooms would like more; from 2 on it diverges.
+    /// ω of `sor`. The default 1.1 is near the best where reflectances are around one half: 1.07 for two unknowns
+    /// that keep half, three sweeps instead of four in catalogue R1. White rooms would like more; from 2 on it
+    /// diverges.
     pub relaxation: f64,
-    /// Directions that `gmres` keeps before it begins anew, each two vectors of memory. Closed cubes need ten or less at any
-    /// reflectance; 30 leaves room for scenes of several rooms.
+    /// Directions that `gmres` keeps before it begins anew, each two vectors of memory. Closed cubes need ten or less
+    /// at any reflectance; 30 leaves room for scenes of several rooms.
     pub restart: usize,
     /// Samples for each unknown in a step of a random method. With the default 64 a step costs as much as measuring its
     /// residual where there are some hundred unknowns.
@@ -81,11 +86,11 @@ impl Default for Params {
 pub struct Info {
     /// Steps of the method: applications of the transport where they are the steps, sweeps, shots, or random runs.
     pub steps: usize,
-    /// What that cost, in applications of the transport, so that methods compare: a shot is one N-th of one, a random draw one N²-th,
-    /// the factors of an N × N matrix N/3 (Cholesky N/6).
+    /// What that cost, in applications of the transport, so that methods compare: a shot is one N-th of one, a random
+    /// draw one N²-th, the factors of an N × N matrix N/3 (Cholesky N/6).
     pub work: f64,
-    /// Relative residual of each band, ‖E + R F B − B‖/‖E‖ in the space's norm. Of shooting it is that of the light that has been
-    /// shot: the unshot energy.
+    /// Relative residual of each band, ‖E + R F B − B‖/‖E‖ in the space's norm. Of shooting it is that of the light
+    /// that has been shot: the unshot energy.
     pub residual: Vec<f64>,
     /// Σ A r/Σ A E of each band for that residual r: the share of the emitted energy that is still to be shot.
     pub unshot: Vec<f64>,

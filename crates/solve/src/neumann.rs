@@ -1,8 +1,8 @@
 //! The Neumann series B = Σ (R F)^k E, bounce by bounce (catalogue 9, 10; Kajiya 1986; Cohen & Wallace 1993, §5.3.1).
 //!
-//! Term k is the light after k reflections. With r_0 = E + R F B_0 − B_0 for a start B_0, the terms r_{k+1} = R F r_k sum up
-//! to the solution, and r_k is the residual after k of them. Truncation after k leaves at most ρ_max^{k+1} of a furnace's
-//! light out. It converges as slowly as Jacobi iteration, whose iterates it repeats but for rounding.
+//! Term k is the light after k reflections. With r_0 = E + R F B_0 − B_0 for a start B_0, the terms r_{k+1} = R F r_k
+//! sum up to the solution, and r_k is the residual after k of them. Truncation after k leaves at most ρ_max^{k+1} of
+//! a furnace's light out. It converges as slowly as Jacobi iteration, whose iterates it repeats but for rounding.
 
 use crate::gauge::{Gauge, begin, is_done, remainder};
 use crate::{Go, Info, Params, Response, SolveError, Transport};
@@ -40,8 +40,8 @@ pub fn neumann<T: Transport>(
     }
 }
 
-/// The light of each bounce by itself: layer 0 is E, layer k what was reflected k times, up to `count` times. The layers
-/// up to the convergence of [`neumann`] sum to its solution.
+/// The light of each bounce by itself: layer 0 is E, layer k what was reflected k times, up to `count` times. The
+/// layers up to the convergence of [`neumann`] sum to its solution.
 ///
 /// ```
 /// use radiosity_solve::{DenseTransport, DiffuseResponse, bounces};

@@ -1,20 +1,27 @@
-//! Overshooting: an unknown shoots in advance what it will have to shoot later (Feda & Purgathofer 1992, "Accelerating
-//! radiosity by overshooting", Eurographics Workshop on Rendering; Gortler, Cohen & Slusallek 1994 place it among the relaxations).
+//! Overshooting: an unknown shoots in advance what it will have to shoot later (Feda & Purgathofer 1992,
+//! "Accelerating radiosity by overshooting", Eurographics Workshop on Rendering; Gortler, Cohen & Slusallek 1994
+//! place it among the relaxations).
 //!
-//! Unknown i shoots ΔB_i + ρ_i a, with a = ΔB̄/(1 − ρ̄) the ambient irradiance that all unshot light will make: what i is going to
-//! receive and reflect on. What it shot too early stands in ΔB_i as a debt, −ρ_i a, which arriving light pays; as ΔB̄ tends
-//! to zero, so does what is shot in advance. i has the largest A_i |ΔB_i + ρ_i a|. The energy that is unshot need not fall
-//! at every shot, and no proof of convergence is known to us. Therefore, whenever N shots have not brought the residual down by a
-//! tenth, N shots without advance follow, which always converge. ΔB̄ is taken
-//! with its sign, so that debts are settled early; by its positive part alone the end takes up to five times as many shots.
+//! Unknown i shoots ΔB_i + ρ_i a, with a = ΔB̄/(1 − ρ̄) the ambient irradiance that all unshot light will make: what
+//! i is going to receive and reflect on. What it shot too early stands in ΔB_i as a debt, −ρ_i a, which arriving
+//! light pays; as ΔB̄ tends to zero, so does what is shot in advance. i has the largest A_i |ΔB_i + ρ_i a|. The
+//! energy that is unshot need not fall at every shot, and no proof of convergence is known to us. Therefore N shots that
+//! have not brought the residual down by a tenth are followed by N without advance, and after the third time there is
+//! none any more: plain shooting always converges. ΔB̄ is taken with its sign, so that debts are settled early; by its
+//! positive part alone the end takes up to three times as many shots.
 
 use crate::gauge::is_done;
 use crate::shot::{Ambient, Shots};
 use crate::{Go, Info, Params, Response, Shoot, SolveError};
 
-/// What N shots must at least leave of the residual for the next N to shoot in advance. Plain shooting with ρ = 0.9 leaves
-/// about that much; with less, overshooting would be given up where it helps most.
+/// What N shots may at most leave of the residual for the next N to shoot in advance: what plain ones leave at ρ =
+/// 0.9, so that an advance which does worse is given up. With 0.5 it would be given up where it works, with 0.99 only
+/// after it has long stood still.
 const PROGRESS: f64 = 0.9;
+
+/// How often that may fail before it is given up for good. The first rounds of a white room may fail once; more often only
+/// what does not converge.
+const PATIENCE: usize = 3;
 
 /// Progressive refinement with overshooting; `b` holds the start and the result.
 ///
@@ -36,7 +43,7 @@ pub fn overshooting<T: Shoot>(
     }
     let unknowns = b.len() / bands;
     let worst = |info: &Info| info.residual.iter().fold(0f64, |m, r| m.max(*r));
-    let (mut advance, mut before) = (true, f64::INFINITY);
+    let (mut advance, mut failures, mut before) = (true, 0, f64::INFINITY);
     let mut extra = vec![0.0; b.len()];
     loop {
         shots.account(&mut info);
@@ -45,7 +52,9 @@ pub fn overshooting<T: Shoot>(
         }
         if info.steps.is_multiple_of(unknowns) {
             let now = worst(&info);
-            advance = !advance || now <= PROGRESS * before;
+            let failed = advance && now > PROGRESS * before;
+            failures += usize::from(failed);
+            advance = !failed && failures < PATIENCE;
             before = now;
         }
         if advance {

@@ -1,8 +1,9 @@
-//! Jacobi iteration, gathering simultaneously: B ← E + R F B (catalogue 32; Cohen & Greenberg 1985; Cohen & Wallace 1993, §5.3.1).
+//! Jacobi iteration, gathering simultaneously: B ← E + R F B (catalogue 32; Cohen & Greenberg 1985; Cohen & Wallace
+//! 1993, §5.3.1).
 //!
-//! The residual r = E + R F B − B is the step itself, so each sweep costs one application of F. The error loses a factor ρ_max
-//! or more in each. It fails where that is near one: 1374 sweeps to 1e-6 on a closed cube with ρ = 0.99; see
-//! [`crate::jacobi`], which deflates the constant.
+//! The residual r = E + R F B − B is the step itself, so each sweep costs one application of F. The error loses a
+//! factor ρ_max or more in each. It fails where that is near one: 1374 sweeps to 1e-6 on a closed cube with ρ = 0.99;
+//! see [`crate::jacobi`], which deflates the constant.
 
 use crate::gauge::{Gauge, begin, is_done};
 use crate::{Go, Info, Params, Response, SolveError, Transport};

@@ -1,15 +1,15 @@
 //! Progressive refinement: light is shot, and every shot leaves a picture (Cohen, Chen, Wallace & Greenberg 1988).
 //!
-//! B = ΔB = E; repeat: choose i; for all j: rad = ΔB_i ρ_j F_ji, ΔB_j += rad, B_j += rad; ΔB_i = 0 (catalogue 38; the self-share
-//! of a curved facet stays unshot). Three ways to choose and to show:
+//! B = ΔB = E; repeat: choose i; for all j: rad = ΔB_i ρ_j F_ji, ΔB_j += rad, B_j += rad; ΔB_i = 0 (catalogue 38; the
+//! self-share of a curved facet stays unshot). Three ways to choose and to show:
 //! - sorted (catalogue 40): i has the greatest unshot energy A_i ΔB_i, summed over the bands;
 //! - cyclic: i runs through all that have anything to shoot;
-//! - sorted, shown with an ambient term (catalogue 41): B_i + ρ_i ΔB̄/(1 − ρ̄) stands in for what is still to come. It is
-//!   for show only and never shot.
+//! - sorted, shown with an ambient term (catalogue 41): B_i + ρ_i ΔB̄/(1 − ρ̄) stands in for what is still to come.
+//!   It is   for show only and never shot.
 //!
-//! The residual told is that of what has been shot, B − ΔB: exactly ΔB. The field shown includes ΔB, which has arrived but
-//! not left, so its own residual R F ΔB is smaller still, and the bound holds for it too. It takes as long to converge as
-//! gathering does; use it for the picture on the way.
+//! The residual told is that of what has been shot, B − ΔB: exactly ΔB. The field shown includes ΔB, which has
+//! arrived but not left, so its own residual R F ΔB is smaller still, and the bound holds for it too. It takes as
+//! long to converge as gathering does; use it for the picture on the way.
 
 use crate::gauge::is_done;
 use crate::shot::{Ambient, Shots};
@@ -92,8 +92,8 @@ pub fn shooting_ambient<T: Shoot>(
     let mut shown = vec![0.0; b.len()];
     loop {
         shots.account(&mut info);
-        // What is missing is within the bound, what stands in for it within ρ_max times the ambient irradiance; of one sign,
-        // their difference is no larger than the larger.
+        // What is missing is within the bound, what stands in for it within ρ_max times the ambient irradiance; of
+        // one sign, their difference is no larger than the larger.
         let one_sign = shots.unshot().iter().all(|x| *x >= 0.0) || shots.unshot().iter().all(|x| *x <= 0.0);
         let standing_in = ambient.irradiance(transport, shots.unshot());
         for ((bound, largest), irradiance) in info.bound.iter_mut().zip(&largest).zip(standing_in) {

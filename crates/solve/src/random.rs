@@ -1,6 +1,7 @@
 //! What the random methods share: numbers, whither light goes, and the mean of independent runs.
 //!
-//! Power that leaves i arrives at j with probability F_ij (for A_j H_j = Σ_i F_ij A_i B_i by reciprocity), and nowhere with 1 − Σ_j F_ij.
+//! Power that leaves i arrives at j with probability F_ij (for A_j H_j = Σ_i F_ij A_i B_i by reciprocity), and
+//! nowhere with 1 − Σ_j F_ij.
 
 use crate::gauge::{Gauge, begin, is_done, remainder};
 use crate::{Go, Info, Params, Response, Rows, SolveError, Space};
@@ -58,8 +59,8 @@ impl Destinations {
         Ok(made)
     }
 
-    /// Where power from i arrives, if anywhere, and by how much it must be multiplied: by more than one only where a row
-    /// sums to more than one.
+    /// Where power from i arrives, if anywhere, and by how much it must be multiplied: by more than one only where a
+    /// row sums to more than one.
     pub fn draw(&self, i: usize, random: &mut Random) -> Option<(usize, f64)> {
         let (first, end) = (self.starts[i], self.starts[i + 1]);
         let all = self.cumulative[first..end].last()?.max(1.0);
@@ -91,8 +92,8 @@ impl Walks<'_> {
     }
 }
 
-/// Deals `samples` out in proportion to `power`: with one random offset for all, each gets its share rounded up or down,
-/// and exactly its share in expectation (Bekaert 1999, §5.2: systematic sampling).
+/// Deals `samples` out in proportion to `power`: with one random offset for all, each gets its share rounded up or
+/// down, and exactly its share in expectation (Bekaert 1999, §5.2: systematic sampling).
 pub(crate) fn deal(power: &[f64], sum: f64, samples: f64, random: &mut Random, mut give: impl FnMut(usize, usize)) {
     let offset = random.unit();
     let (mut reached, mut dealt) = (0.0, 0usize);

@@ -1,10 +1,11 @@
-//! Random walk radiosity: particles are shot, reflected and absorbed (catalogue 94; Shirley 1990; Sbert 1997; Bekaert 1999, ch. 4).
+//! Random walk radiosity: particles are shot, reflected and absorbed (catalogue 94; Shirley 1990; Sbert 1997; Bekaert
+//! 1999, ch. 4).
 //!
-//! A walk starts at i with a probability in proportion to its power A_i E_i, and goes on to j with probability F_ij. It scores
-//! at each landing what is reflected there (the collision estimator): B_j += ρ_j Φ/A_j for a power Φ, by band. Then it survives
-//! with the largest ρ_j of the bands, Φ being weighed so that the expectation stays. Unbiased; the variance falls as one over the
-//! number of walks. It needs a reciprocal F. It is poor on small unknowns, which few walks meet, and never reaches a small residual: a thousandth
-//! takes a million walks or more.
+//! A walk starts at i with a probability in proportion to its power A_i E_i, and goes on to j with probability F_ij.
+//! It scores at each landing what is reflected there (the collision estimator): B_j += ρ_j Φ/A_j for a power Φ, by
+//! band. Then it survives with the largest ρ_j of the bands, Φ being weighed so that the expectation stays. Unbiased;
+//! the variance falls as one over the number of walks. It needs a reciprocal F. It is poor on small unknowns, which
+//! few walks meet, and never reaches a small residual: a thousandth takes a million walks or more.
 
 use crate::random::{Random, Walks, deal, repeat};
 use crate::{Go, Info, Params, Response, Rows, SolveError};
@@ -13,8 +14,8 @@ use crate::{Go, Info, Params, Response, Rows, SolveError};
 /// [`Info::standard_error`] how sure that is. The walks of a start carry what its residual leaves.
 ///
 /// # Errors
-/// [`SolveError::NotApplicable`] if a response is not self-adjoint or not below one, or an entry of F negative; otherwise as
-/// [`crate::plain_jacobi`].
+/// [`SolveError::NotApplicable`] if a response is not self-adjoint or not below one, or an entry of F negative;
+/// otherwise as [`crate::plain_jacobi`].
 pub fn random_walk<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),

@@ -1,7 +1,8 @@
-//! One shot: what an unknown has not yet shot goes to all others (catalogue 38; Cohen, Chen, Wallace & Greenberg 1988, §3).
+//! One shot: what an unknown has not yet shot goes to all others (catalogue 38; Cohen, Chen, Wallace & Greenberg
+//! 1988, §3).
 //!
-//! With ΔB the unshot radiosity, a shot of amount a from i is h_j = F_ji a, ΔB_i ← ΔB_i − a, ΔB ← ΔB + R h. It takes one
-//! column of F and O(N) memory. The sum shot so far, B − ΔB, has ΔB as its exact residual at all times.
+//! With ΔB the unshot radiosity, a shot of amount a from i is h_j = F_ji a, ΔB_i ← ΔB_i − a, ΔB ← ΔB + R h. It takes
+//! one column of F and O(N) memory. The sum shot so far, B − ΔB, has ΔB as its exact residual at all times.
 
 use crate::gauge::{Gauge, begin, energy, remainder};
 use crate::{Info, Response, Shoot, Space, Transport};
@@ -91,8 +92,8 @@ impl<'a, T: Shoot, R: Response + ?Sized> Shots<'a, T, R> {
 
 /// The ambient estimate of what is still to come (catalogue 41; Cohen et al. 1988, §4.3).
 ///
-/// The mean unshot radiosity ΔB̄ = Σ A_j ΔB_j/Σ A_j, reflected again and again by walls of mean reflectance ρ̄, makes the
-/// irradiance ΔB̄/(1 − ρ̄) everywhere. It tends to zero with ΔB.
+/// The mean unshot radiosity ΔB̄ = Σ A_j ΔB_j/Σ A_j, reflected again and again by walls of mean reflectance ρ̄, makes
+/// the irradiance ΔB̄/(1 − ρ̄) everywhere. It tends to zero with ΔB.
 pub(crate) struct Ambient {
     /// ρ, as R 1.
     reflectance: Vec<f64>,

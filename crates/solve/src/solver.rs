@@ -4,8 +4,9 @@ use crate::*;
 use std::fmt;
 use std::str::FromStr;
 
-/// Makes [`Solver`], its names and descriptions, and the two functions that choose, from one line for each solver: those that
-/// need a transport that can be applied and no more, those that need a stored matrix, and those that draw from it at random.
+/// Makes [`Solver`], its names and descriptions, and the two functions that choose, from one line for each solver:
+/// those that need a transport that can be applied and no more, those that need a stored matrix, and those that draw
+/// from it at random.
 macro_rules! table {
     (
         applied { $($applied:ident $applied_name:literal $applied_fn:ident $applied_text:literal;)* }
@@ -75,8 +76,8 @@ macro_rules! table {
             }
         }
 
-        /// Solves B = E + R F B for a stored matrix by any solver of the table; `b` holds the start (warm or zero) and the
-        /// result, `step` sees each iterate.
+        /// Solves B = E + R F B for a stored matrix by any solver of the table; `b` holds the start (warm or zero)
+        /// and the result, `step` sees each iterate.
         ///
         /// ```
         /// use radiosity_solve::{DenseTransport, DiffuseResponse, Go, Params, Solver, solve};
@@ -92,9 +93,9 @@ macro_rules! table {
         /// ```
         ///
         /// # Errors
-        /// [`SolveError::Reflectance`] for a reflectance that is not between 0 and 1; [`SolveError::NotApplicable`] where the solver does not fit
-        /// the response or the matrix; [`SolveError::NotConverged`] with the last iterate left in `b`; [`SolveError::Stopped`] if
-        /// `step` says so.
+        /// [`SolveError::Reflectance`] for a reflectance that is not between 0 and 1; [`SolveError::NotApplicable`]
+        /// where the solver does not fit the response or the matrix; [`SolveError::NotConverged`] with the last
+        /// iterate left in `b`; [`SolveError::Stopped`] if `step` says so.
         pub fn solve<T: Rows + Shoot>(
             solver: Solver,
             transport: &T,
@@ -139,7 +140,7 @@ macro_rules! table {
 table! {
     applied {
         Jacobi "jacobi" plain_jacobi "Gathering simultaneously, B ← E + R F B (Cohen & Greenberg 1985)";
-        DeflatedJacobi "deflated-jacobi" jacobi "Jacobi with the energy of each part balanced at every sweep (Nicolaides 1987)";
+        DeflatedJacobi "deflated-jacobi" jacobi "Jacobi with the energy balanced at every sweep (Nicolaides 1987)";
         Neumann "neumann" neumann "Neumann series, a bounce a step (Kajiya 1986)";
         Cg "cg" conjugate_gradient "Conjugate gradients in the inner product weighted by A/ρ (Hestenes & Stiefel 1952)";
         Bicgstab "bicgstab" bicgstab "Stabilised biconjugate gradients, for what is not symmetric (van der Vorst 1992)";
@@ -184,8 +185,9 @@ impl FromStr for Solver {
     }
 }
 
-/// Refuses fields of the wrong length and reflectances that no surface has (catalogue 35). One is allowed, for surfaces that give
-/// back all they receive in an enclosure that is otherwise open or grey; the bound is infinite then.
+/// Refuses fields of the wrong length and reflectances that no surface has (catalogue 35). One is allowed, for
+/// surfaces that give back all they receive in an enclosure that is otherwise open or grey; the bound is infinite
+/// then.
 fn check<T: Transport>(
     transport: &T,
     response: &(impl Response + ?Sized),

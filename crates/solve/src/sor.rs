@@ -1,12 +1,13 @@
-//! Gauss–Seidel and successive overrelaxation: gathering in sequence (catalogue 33, 36; Young 1950; Cohen & Wallace 1993, §5.3.2).
+//! Gauss–Seidel and successive overrelaxation: gathering in sequence (catalogue 33, 36; Young 1950; Cohen & Wallace
+//! 1993, §5.3.2).
 //!
-//! Unknown after unknown, B_i ← (1 − ω) B_i + ω (E_i + ρ_i Σ_{j≠i} F_ij B_j)/(1 − ρ_i F_ii), new values being used at once;
-//! ω = 1 is Gauss–Seidel. On a symmetrisable system it converges for 0 < ω < 2 (Ostrowski 1954). It needs rows in turn, so
-//! it does not run in parallel, and a response that is diagonal.
+//! Unknown after unknown, B_i ← (1 − ω) B_i + ω (E_i + ρ_i Σ_{j≠i} F_ij B_j)/(1 − ρ_i F_ii), new values being used at
+//! once; ω = 1 is Gauss–Seidel. On a symmetrisable system it converges for 0 < ω < 2 (Ostrowski 1954). It needs rows
+//! in turn, so it does not run in parallel, and a response that is diagonal.
 //!
-//! The residual costs nothing. The sum over row i is split at the diagonal: the part beyond it, taken after a sweep, is what
-//! the next sweep needs, and the part before it was summed over new values during this one. So a sweep with its residual
-//! reads each entry once.
+//! The residual costs nothing. The sum over row i is split at the diagonal: the part beyond it, taken after a sweep,
+//! is what the next sweep needs, and the part before it was summed over new values during this one. So a sweep with
+//! its residual reads each entry once.
 
 use crate::gauge::{Gauge, is_done};
 use crate::{Go, Info, Params, Response, Rows, SolveError, Space};

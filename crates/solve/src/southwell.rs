@@ -1,8 +1,8 @@
 //! Southwell's relaxation: always the largest residual (catalogue 37; Southwell 1946; Gortler, Cohen & Slusallek 1994).
 //!
-//! i = argmax A_i |r_i|, then B_i ← B_i + r_i; that changes the residual by one column, r_j ← r_j + ρ_j F_ji r_i, and sets
-//! r_i to its self-share. Started from zero its residuals are the unshot radiosities of progressive refinement, number by
-//! number; only what is shown differs, by just these. It converges as slowly as that does.
+//! i = argmax A_i |r_i|, then B_i ← B_i + r_i; that changes the residual by one column, r_j ← r_j + ρ_j F_ji r_i, and
+//! sets r_i to its self-share. Started from zero its residuals are the unshot radiosities of progressive refinement,
+//! number by number; only what is shown differs, by just these. It converges as slowly as that does.
 
 use crate::gauge::is_done;
 use crate::shot::Shots;

@@ -1,14 +1,16 @@
 //! F as compressed rows: only the pairs that see each other (CSR; Saad 2003, §3.4).
 //!
 //! Values may be single or double precision; sums are always double. Single precision halves the memory and moves the
-//! answer by some 1e-7; it does so for F_ij and F_ji apart, so that columns are then kept beside the rows as soon as one is asked for.
+//! answer by some 1e-7; it does so for F_ij and F_ji apart, so that columns are then kept beside the rows as soon as
+//! one is asked for.
 
 use crate::dense::RECIPROCAL;
 use crate::{AreaSpace, Rows, Shoot, SolveError, Space, Transport};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// A matrix of form factors of which only the entries that are not zero are stored, with values of type `V`: `f32` or `f64`.
+/// A matrix of form factors of which only the entries that are not zero are stored, with values of type `V`: `f32` or
+/// `f64`.
 #[derive(Clone, Debug)]
 pub struct SparseTransport<V = f64> {
     space: AreaSpace,

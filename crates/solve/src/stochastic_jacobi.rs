@@ -1,16 +1,17 @@
 //! Stochastic Jacobi radiosity: incremental power shooting with random targets (catalogue 94; Neumann 1995; Neumann,
 //! Purgathofer, Tobler et al. 1995; Bekaert 1999, ch. 5).
 //!
-//! A round shoots the unshot power of all unknowns at once: N_i samples leave i, in proportion to A_i ΔB_i, each lands at j with
-//! probability F_ij, and what lands is the next round's unshot power. All samples stand for the same power, so rounds get
-//! shorter as ρ^k. When less than one sample's power is left, it goes on with the probability of its share, so that the end is not a
-//! bias. The variance falls as one over the number of samples; like random walks it needs a reciprocal F and is poor on small unknowns.
+//! A round shoots the unshot power of all unknowns at once: N_i samples leave i, in proportion to A_i ΔB_i, each
+//! lands at j with probability F_ij, and what lands is the next round's unshot power. All samples stand for the same
+//! power, so rounds get shorter as ρ^k. When less than one sample's power is left, it goes on with the probability of
+//! its share, so that the end is not a bias. The variance falls as one over the number of samples; like random walks
+//! it needs a reciprocal F and is poor on small unknowns.
 
 use crate::random::{Random, Walks, deal, repeat};
 use crate::{Go, Info, Params, Response, Rows, SolveError};
 
-/// Stochastic Jacobi runs, [`Params::samples`] in the first round for each unknown; a step is a whole run. `b` holds the start
-/// and the mean over all runs, [`Info::standard_error`] how sure that is.
+/// Stochastic Jacobi runs, [`Params::samples`] in the first round for each unknown; a step is a whole run. `b` holds
+/// the start and the mean over all runs, [`Info::standard_error`] how sure that is.
 ///
 /// # Errors
 /// As [`crate::random_walk`].

@@ -1,10 +1,11 @@
 //! Substructuring: N patches shoot, M > N elements receive (catalogue 47; Cohen, Greenberg, Immel & Brock 1986).
 //!
-//! G is M × N: h_e = Σ_p G_ep B_p, with G_ep the form factor from element e to patch p, and a patch's radiosity is the mean of its
-//! elements' by area, B_p = Σ_e A_e B_e/A_p. As a transport over the elements this is F = G P with P that mean: it costs M N instead of M².
-//! Where the reflectance is constant on each patch, the N × N factors P G of the patches may be solved by any solver instead,
-//! and one gather G B gives the elements. It is blind to gradients of what shoots: a patch shines evenly. F is not reciprocal
-//! between elements, so of the Krylov methods take bicgstab or gmres for it.
+//! G is M × N: h_e = Σ_p G_ep B_p, with G_ep the form factor from element e to patch p, and a patch's radiosity is
+//! the mean of its elements' by area, B_p = Σ_e A_e B_e/A_p. As a transport over the elements this is F = G P with P
+//! that mean: it costs M N instead of M². Where the reflectance is constant on each patch, the N × N factors P G of
+//! the patches may be solved by any solver instead, and one gather G B gives the elements. It is blind to gradients
+//! of what shoots: a patch shines evenly. F is not reciprocal between elements, so of the Krylov methods take
+//! bicgstab or gmres for it.
 
 use crate::{AreaSpace, DenseTransport, SolveError, Transport};
 use rayon::prelude::*;

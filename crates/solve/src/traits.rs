@@ -38,7 +38,8 @@ pub trait Rows: Transport {
 
 /// A transport that can send the light of one unknown to all others: what Southwell and progressive refinement ask for.
 pub trait Shoot: Transport {
-    /// Writes into `h` what `unshot`, a radiosity by band of unknown `source` alone, brings to all: h_j = F_j,source unshot.
+    /// Writes into `h` what `unshot`, a radiosity by band of unknown `source` alone, brings to all: h_j = F_j,source
+    /// unshot.
     fn shoot(&self, source: usize, unshot: &[f64], h: &mut [f64]);
 }
 

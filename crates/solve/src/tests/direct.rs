@@ -78,7 +78,8 @@ fn catalogue_31_boxes_of_one_patch_a_face() {
         let area = [x * y, x * y, x * z, x * z, y * z, y * z];
         let parallel = [(x, y, z), (x, z, y), (y, z, x)].map(|(a, b, c)| parallel(a, b, c));
         let mut rows = vec![0.0; 36];
-        // A_p F_pq of the three pairs of directions, from the three sums of a row: 2 Σ_q A_p F_pq = A_p (1 − F_opposite).
+        // A_p F_pq of the three pairs of directions, from the three sums of a row: 2 Σ_q A_p F_pq = A_p (1 −
+        // F_opposite).
         let free: Vec<f64> = (0..3).map(|p| area[2 * p] * (1.0 - parallel[p]) / 2.0).collect();
         let half = free.iter().sum::<f64>() / 2.0;
         for i in 0..6 {

@@ -74,8 +74,8 @@ fn catalogue_5_furnace_in_every_solver() {
     }
 }
 
-/// Catalogue 8: the symmetric form is symmetric and positive, and sampled rows that are not reciprocal are refused where that is
-/// asked for.
+/// Catalogue 8: the symmetric form is symmetric and positive, and sampled rows that are not reciprocal are refused
+/// where that is asked for.
 #[test]
 fn catalogue_8_symmetric_form() {
     let mut system = room(3);
@@ -164,8 +164,8 @@ fn catalogue_10_layers_sum_to_the_solution() {
     }
 }
 
-/// Catalogue 35, 42: at every step of every solver the bound holds, and in the end the tolerance is kept by the true residual. The rows of
-/// R1's kind sum to up to 1.02, which the bound must know.
+/// Catalogue 35, 42: at every step of every solver the bound holds, and in the end the tolerance is kept by the true
+/// residual. The rows of R1's kind sum to up to 1.02, which the bound must know.
 #[test]
 fn catalogue_35_bound_holds_at_every_step_of_every_solver() {
     let bright =

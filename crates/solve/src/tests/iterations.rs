@@ -171,8 +171,8 @@ fn closed_cube(rho: f64) -> System {
     box_of([1.0; 3], 10).closed().system(|_| rho, |_, c| pattern(c))
 }
 
-/// Iterations from B = E to a relative error of 1e-6 on a closed cube of 600 patches, all alike, emission without pattern:
-/// Jacobi and Gauss–Seidel lose the constant at the rate of ρ; Krylov methods and deflation do not care.
+/// Iterations from B = E to a relative error of 1e-6 on a closed cube of 600 patches, all alike, emission without
+/// pattern: Jacobi and Gauss–Seidel lose the constant at the rate of ρ; Krylov methods and deflation do not care.
 #[test]
 fn catalogue_8_iterations_on_a_closed_cube() {
     let solvers =
@@ -202,8 +202,8 @@ fn catalogue_8_iterations_on_a_closed_cube() {
     }
 }
 
-/// Catalogue 39: what shooting costs to an error of 1 % on the same cube, in applications of F: 2.7, 9.7 and 44 were measured
-/// with another emission, which is worth half a sweep either way. Overshooting takes a sweep or two.
+/// Catalogue 39: what shooting costs to an error of 1 % on the same cube, in applications of F: 2.7, 9.7 and 44 were
+/// measured with another emission, which is worth half a sweep either way. Overshooting takes a sweep or two.
 #[test]
 fn catalogue_39_shots_on_a_closed_cube() {
     for (rho, expected) in [(0.5, 2.7), (0.8, 9.7), (0.95, 44.0)] {

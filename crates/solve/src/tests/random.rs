@@ -25,8 +25,9 @@ fn steps(system: &System, solver: Solver, start: &[f64], params: Params, count: 
     (b, last)
 }
 
-/// Catalogue 94: unbiased, from zero and from a warm start, with an error bar that tells the truth. Each of the numbers lies within
-/// 4.5 standard errors (a false alarm once in ten thousand sets of seeds), and the mean of their squared z is near one.
+/// Catalogue 94: unbiased, from zero and from a warm start, with an error bar that tells the truth. Each of the
+/// numbers lies within 4.5 standard errors (a false alarm once in ten thousand sets of seeds), and the mean of their
+/// squared z is near one.
 #[test]
 fn catalogue_94_unbiased_with_standard_errors() {
     let system = room(3);

@@ -23,8 +23,8 @@ fn catalogue_37_southwell_is_progressive_refinement() {
     }
 }
 
-/// Catalogue 38: the unshot energy falls at every shot; the residual told of Southwell is the true one; the limit is that of
-/// elimination; a shot is the N-th part of a sweep.
+/// Catalogue 38: the unshot energy falls at every shot; the residual told of Southwell is the true one; the limit is
+/// that of elimination; a shot is the N-th part of a sweep.
 #[test]
 fn catalogue_38_progressive_refinement() {
     let system = room(4);

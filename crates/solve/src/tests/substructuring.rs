@@ -26,8 +26,8 @@ fn substructure(n: usize) -> (Substructure, DiffuseResponse, Vec<f64>) {
     (Substructure::new(fine.area, patch, factors).unwrap(), response, e)
 }
 
-/// Catalogue 47: the flux on a patch is the sum of that on its elements; patches solved by themselves and gathered once are what
-/// the elements' own equation gives.
+/// Catalogue 47: the flux on a patch is the sum of that on its elements; patches solved by themselves and gathered
+/// once are what the elements' own equation gives.
 #[test]
 fn catalogue_47_patches_and_elements() {
     let (scene, response, e) = substructure(3);

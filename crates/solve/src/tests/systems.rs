@@ -49,7 +49,8 @@ impl System {
     }
 }
 
-/// The unit cube with one constant patch per face (catalogue 20): opposite 0.1998248957, adjacent 0.2000437761. Face 0 emits.
+/// The unit cube with one constant patch per face (catalogue 20): opposite 0.1998248957, adjacent 0.2000437761. Face
+/// 0 emits.
 pub fn cube(rho: f64) -> System {
     let opposite = 0.199_824_895_7;
     let adjacent = (1.0 - opposite) / 4.0;
@@ -61,7 +62,8 @@ pub fn cube(rho: f64) -> System {
     System::new(vec![1.0; 6], rows, vec![rho; 6], vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 }
 
-/// The textbook's 2x + y = 8, x + 2y = 10 as x = 4 − y/2, y = 5 − x/2: reflectances of one half and factors of minus one.
+/// The textbook's 2x + y = 8, x + 2y = 10 as x = 4 − y/2, y = 5 − x/2: reflectances of one half and factors of minus
+/// one.
 pub fn textbook() -> System {
     System::new(vec![1.0; 2], vec![0.0, -1.0, -1.0, 0.0], vec![0.5; 2], vec![4.0, 5.0])
 }
@@ -181,8 +183,8 @@ impl Box6 {
     }
 }
 
-/// Reference run R1 of the catalogue: the unit cube, 12 × 12 patches a face, floor 0.3, ceiling 0.8, walls 0.5, the four
-/// patches in the middle of the ceiling emit.
+/// Reference run R1 of the catalogue: the unit cube, 12 × 12 patches a face, floor 0.3, ceiling 0.8, walls 0.5, the
+/// four patches in the middle of the ceiling emit.
 pub fn r1() -> System {
     let middle = |x: f64| (x - 0.5).abs() < 1.01 / 12.0;
     box_of([1.0; 3], 12).symmetrised().system(
