@@ -19,8 +19,8 @@ use crate::{Go, Info, Params, Response, Shoot, SolveError};
 /// after it has long stood still.
 const PROGRESS: f64 = 0.9;
 
-/// How often that may fail before it is given up for good. The first rounds of a white room may fail once; more often only
-/// what does not converge.
+/// How often that may fail before it is given up for good. Closed cubes up to ρ = 0.99 never fail; what fails again after
+/// rounds without advance does not converge with it.
 const PATIENCE: usize = 3;
 
 /// Progressive refinement with overshooting; `b` holds the start and the result.
@@ -50,7 +50,8 @@ pub fn overshooting<T: Shoot>(
         if is_done(b, &info, params, &mut step)? {
             return Ok(info);
         }
-        if info.steps.is_multiple_of(unknowns) {
+        // The first round builds up the debts, more of them the whiter the room, and is not judged.
+        if info.steps > 0 && info.steps.is_multiple_of(unknowns) {
             let now = worst(&info);
             let failed = advance && now > PROGRESS * before;
             failures += usize::from(failed);
