@@ -1,4 +1,4 @@
-//! Everything that comes in or goes out: glTF, OBJ, sky pictures, lists of points.
+//! Everything that comes in or goes out: glTF, OBJ, View3D, sky pictures, lists of points, form factors.
 //!
 //! Input is somebody else's data. Whatever the bytes, reading ends, takes no more memory than the bytes justify,
 //! opens nothing outside the folder of the file, and answers with a scene of finite numbers or with every fault found.
@@ -27,6 +27,7 @@ mod points;
 mod sky;
 pub mod source;
 mod staged;
+pub mod vs3;
 
 pub use bytes::Bytes;
 pub use error::LoadError;
@@ -37,3 +38,4 @@ pub use points::{Point, Points, parse_points_csv, read_points_csv};
 pub use sky::{load_sky_hdr, parse_sky};
 pub use source::{Folder, Memory, Source, SourceError};
 pub use staged::Staged;
+pub use vs3::{Vs3, parse_vs3};
