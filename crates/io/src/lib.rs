@@ -15,7 +15,9 @@
 mod assemble;
 mod bytes;
 mod data_uri;
+mod enclosure;
 mod error;
+pub mod factors_out;
 pub mod gltf;
 pub mod gltf_out;
 pub mod image_out;
@@ -30,7 +32,9 @@ mod staged;
 pub mod vs3;
 
 pub use bytes::Bytes;
+pub use enclosure::{Grouping, LoadedEnclosure, enclosure_of, load_enclosure};
 pub use error::LoadError;
+pub use factors_out::{FactorFormat, FactorRows, FactorTable, FactorsError, write_factors};
 pub use gltf::{Document, EncodedImage};
 pub use load::{Loaded, load};
 pub use options::LoadOptions;

@@ -88,6 +88,10 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
             let loaded = obj::load(&file, &bytes, &folder, options)?;
             Loaded { files: folder.into_files(), ..loaded }
         }
+        "vs3" => {
+            let hint = "it is read where factors are asked for; scenes are .glb, .gltf or .obj";
+            return Err(LoadError::one(file, "a View3D file has surfaces for form factors and no light", hint));
+        }
         _ => {
             let what = format!("'.{extension}' is no known kind of scene");
             return Err(LoadError::one(file, what, "scenes are .glb, .gltf or .obj"));

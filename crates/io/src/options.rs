@@ -5,7 +5,7 @@ use radiosity_scene::Up;
 /// How to read a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
-    /// Length of one unit of an OBJ in metres (OBJ has no unit). glTF is in metres always.
+    /// Length of one unit of an OBJ or View3D file in metres (these have no unit). glTF is in metres always.
     pub metres_per_unit: f64,
     /// Zenith direction; by default +Y for every format, as glTF has it.
     pub up: Option<Up>,

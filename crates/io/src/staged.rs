@@ -2,7 +2,7 @@
 //! half a file and changes none that was there.
 
 use std::fs::{File, remove_file, rename};
-use std::io::{Result, Write};
+use std::io::{BufWriter, IntoInnerError, Result, Write};
 use std::path::{Path, PathBuf};
 
 /// A file on its way. Dropped before [`Staged::place`], it leaves nothing behind.
@@ -33,9 +33,14 @@ impl Staged {
 
     /// Writes it beside its place, down to the disk.
     pub fn write(&self, bytes: &[u8]) -> Result<()> {
-        let mut file = File::create(&self.beside)?;
-        file.write_all(bytes)?;
-        file.sync_all()
+        self.write_with(|out| out.write_all(bytes))
+    }
+
+    /// As [`Staged::write`], piece by piece, for what would fill the memory.
+    pub fn write_with(&self, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+        let mut out = BufWriter::new(File::create(&self.beside)?);
+        write(&mut out)?;
+        out.into_inner().map_err(IntoInnerError::into_error)?.sync_all()
     }
 
     /// Moves it to its place.

@@ -1,6 +1,7 @@
 //! Damaged files: every one is refused or loads into a scene that keeps its promises; none brings the reader down.
 
-use radiosity_io::{LoadOptions, Source, SourceError, gltf, obj, parse_points_csv, parse_sky};
+use radiosity_io::factors_out::parse_view3d_text;
+use radiosity_io::{LoadOptions, Source, SourceError, gltf, obj, parse_points_csv, parse_sky, parse_vs3};
 use radiosity_scene::Scene;
 use std::path::Path;
 
@@ -127,6 +128,28 @@ fn damaged_points_and_skies() {
             let mut scene = Scene::default();
             scene.set_sky(sky, "t");
             assert!(scene.lights.iter().flat_map(|l| l.intensity).all(|e| e.is_finite()));
+        }
+    }
+}
+
+#[test]
+fn damaged_view3d_files() {
+    let files = ["vs3/wall.vs3", "vs3/l-room.vs3", "vs3/l-room-3a.vs3", "vs3/latin-1.vs3", "vs3/broken.vs3"];
+    each_damaged(&files, 4000, |bytes| {
+        let Ok(vs3) = parse_vs3("t.vs3", bytes) else { return };
+        let areas = vs3.enclosure.surface_areas();
+        assert!(areas.iter().all(|area| *area > 0.0), "{areas:?}");
+        for facet in vs3.enclosure.facets.iter().chain(&vs3.enclosure.obstructions) {
+            assert!(facet.area() > 0.0 && facet.corners().iter().all(|c| c.is_finite()), "{facet:?}");
+        }
+        let masked = vs3.with_masks(&areas, &vec![0.0; areas.len().pow(2)]);
+        assert_eq!(masked.areas.len(), areas.len() + vs3.masks.len());
+    });
+    let output = b"View3D 3.3.1 0 1 0 2          \n1 1\n0.000000 1.000000\n1.000000 0.000000\n0.900 0.900\n";
+    let mut random = Random(4);
+    for _ in 0..20_000 {
+        if let Ok(output) = parse_view3d_text("t.txt", &damaged(output, &mut random)) {
+            assert_eq!(output.factors.len(), output.areas.len().pow(2));
         }
     }
 }

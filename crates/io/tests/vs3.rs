@@ -1,7 +1,7 @@
 //! View3D files: what they say reaches the enclosure, and every fault is named with its line.
 
 use glam::DVec3;
-use radiosity_io::{Vs3, parse_vs3};
+use radiosity_io::{Grouping, LoadOptions, Vs3, load_enclosure, parse_vs3};
 use radiosity_scene::Facet;
 
 fn data(file: &str) -> Vec<u8> {
@@ -214,4 +214,26 @@ fn gaps_and_differing_parts_are_warnings() {
         assert!(warnings.contains(expected), "{expected}\n{warnings}");
     }
     assert_eq!((vs3.enclosure.surface_of.as_slice(), vs3.enclosure.surface_areas()), (&[0, 0][..], vec![1.0]));
+}
+
+#[test]
+fn enclosures_come_from_view3d_files_and_scenes() {
+    let data = |file: &str| std::path::PathBuf::from(format!("{}/tests/data/{file}", env!("CARGO_MANIFEST_DIR")));
+    let feet = LoadOptions { metres_per_unit: 0.3048, ..LoadOptions::default() };
+    let wall = load_enclosure(&data("vs3/wall.vs3"), &feet, Grouping::Material).unwrap();
+    let (areas, square_foot) = (wall.enclosure.surface_areas(), 0.3048_f64.powi(2));
+    assert!((areas[1] - 18.0 * square_foot).abs() < 1e-12, "{areas:?}");
+    assert!((wall.vs3.unwrap().masks[0].area - square_foot).abs() < 1e-12);
+
+    for grouping in [Grouping::Material, Grouping::Object, Grouping::Triangle] {
+        let cornell = load_enclosure(&data("scenes/cornell/cornell-box.obj"), &feet, grouping).unwrap().enclosure;
+        assert!(!cornell.surfaces.is_empty() && cornell.surfaces.len() <= cornell.facets.len());
+        assert_eq!(cornell.surface_of.len(), cornell.facets.len());
+        assert!(cornell.surface_areas().iter().all(|area| *area > 0.0));
+    }
+    let missing = load_enclosure(&data("vs3/none.vs3"), &feet, Grouping::Object).unwrap_err().to_string();
+    assert!(missing.contains("none.vs3: cannot be read"), "{missing}");
+    let none = LoadOptions { metres_per_unit: 0.0, ..feet };
+    let refused = load_enclosure(&data("vs3/wall.vs3"), &none, Grouping::Object).unwrap_err().to_string();
+    assert!(refused.contains("0 metres per unit"), "{refused}");
 }
