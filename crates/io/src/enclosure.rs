@@ -4,6 +4,7 @@ use crate::source::read_plain_file;
 use crate::{LoadError, LoadOptions, Vs3, load, vs3};
 use radiosity_scene::{AlphaMode, Enclosure, EnclosureSurface, Facet, Faults, Scene, counted};
 use rustc_hash::FxHashMap;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -107,9 +108,8 @@ pub fn enclosure_of(scene: &Scene, grouping: Grouping, file: &str, faults: &mut 
         let what = format!("{} no area; left out", counted(without_area, "triangle has", "triangles have"));
         faults.warning(file, what, "harmless where they are slivers");
     }
-    let used = |material: &usize| scene.objects.iter().any(|o| o.material == *material && !o.triangles.is_empty());
-    for index in (0..scene.materials.len()).filter(used) {
-        let material = &scene.materials[index];
+    let used: BTreeSet<usize> = scene.objects.iter().filter(|o| !o.triangles.is_empty()).map(|o| o.material).collect();
+    for material in used.into_iter().map(|index| &scene.materials[index]) {
         if material.alpha_mode != AlphaMode::Opaque {
             let what = format!("material '{}' lets light through", material.name);
             faults.warning(file, what, "between facets all surfaces are opaque; leave out what is not");

@@ -24,13 +24,13 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// With its article, for messages.
+    /// In messages.
     pub fn word(self) -> &'static str {
         match self {
-            Kind::Radiating => "a surface",
-            Kind::Mask => "a mask",
-            Kind::Null => "a null surface",
-            Kind::Obstruction => "an obstruction",
+            Kind::Radiating => "surface",
+            Kind::Mask => "mask",
+            Kind::Null => "null surface",
+            Kind::Obstruction => "obstruction",
         }
     }
 }
