@@ -5,51 +5,64 @@
 
 use glam::DVec3;
 
-/// Form factor from the differential area at `point` with unit `normal` to the triangle `corners`, which emits towards
+/// Form factor from the differential area at `point` with unit `normal` to the polygon `corners`, which emits towards
 /// the side from which its corners run counter-clockwise. Zero when the point is behind it.
-pub fn point_to_triangle(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> f64 {
-    let [a, b, c] = corners.map(|p| p - point);
+pub fn point_to_polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
+    let Some(first) = corners.first() else { return 0.0 };
     // Behind the emitting side, or in its plane: nothing arrives.
-    if (b - a).cross(c - a).dot(a) >= 0.0 {
-        return 0.0;
-    }
-    let heights = [a, b, c].map(|p| p.dot(normal));
-    if heights.iter().all(|h| *h <= 0.0) {
-        return 0.0;
-    }
-    if heights.iter().all(|h| *h >= 0.0) {
-        return contour(&[a, b, c], normal);
-    }
-    // Clip to the horizon: a triangle leaves at most four corners.
-    let (mut clipped, mut count) = ([DVec3::ZERO; 4], 0);
-    let corners = [a, b, c];
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        if heights[i] >= 0.0 {
-            clipped[count] = corners[i];
-            count += 1;
-        }
-        if heights[i] * heights[j] < 0.0 {
-            clipped[count] = corners[i] + heights[i] / (heights[i] - heights[j]) * (corners[j] - corners[i]);
-            count += 1;
-        }
-    }
-    contour(&clipped[..count], normal)
+    let twice: DVec3 = corners[1..].windows(2).map(|pair| (pair[0] - *first).cross(pair[1] - *first)).sum();
+    if twice.dot(*first - point) >= 0.0 { 0.0 } else { around(point, normal, corners) }
 }
 
-/// The contour integral of a polygon above the horizon, its corners relative to the receiver. The corners of an
-/// emitter run counter-clockwise seen from the receiver, so Γ points away from the normal; hence the order b × a.
-pub(crate) fn contour(polygon: &[DVec3], normal: DVec3) -> f64 {
+/// [`point_to_polygon`] for a triangle.
+#[inline]
+pub fn point_to_triangle(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    if (b - a).cross(c - a).dot(a - point) >= 0.0 { 0.0 } else { around(point, normal, &corners) }
+}
+
+/// The contour integral around the outline above the horizon; where it dips below, along the horizon to where it comes
+/// up again.
+#[inline]
+fn around(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
+    let Some(last) = corners.last() else { return 0.0 };
     let mut sum = 0.0;
-    for (i, &a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let cross = b.cross(a);
-        let sine = cross.length();
-        if sine > 0.0 {
-            sum += sine.atan2(a.dot(b)) / sine * cross.dot(normal);
+    let (mut set, mut risen): (Option<DVec3>, Option<DVec3>) = (None, None);
+    let mut a = *last - point;
+    let mut height_a = a.dot(normal);
+    for corner in corners {
+        let b = *corner - point;
+        let height_b = b.dot(normal);
+        if height_a >= 0.0 && height_b >= 0.0 {
+            sum += contour(a, b, normal);
+        } else if height_a >= 0.0 || height_b >= 0.0 {
+            let c = a + height_a / (height_a - height_b) * (b - a);
+            if height_a >= 0.0 {
+                sum += contour(a, c, normal);
+                set = Some(c);
+            } else {
+                match set.take() {
+                    Some(set) => sum += contour(set, c, normal),
+                    None => risen = Some(c),
+                }
+                sum += contour(c, b, normal);
+            }
         }
+        (a, height_a) = (b, height_b);
+    }
+    if let (Some(set), Some(risen)) = (set, risen) {
+        sum += contour(set, risen, normal);
     }
     (sum / std::f64::consts::TAU).max(0.0)
+}
+
+/// Γ · n of the edge from a to b, relative to the receiver. The corners of an emitter run counter-clockwise seen from the
+/// receiver, so Γ points away from the normal; hence the order b × a.
+#[inline]
+fn contour(a: DVec3, b: DVec3, normal: DVec3) -> f64 {
+    let cross = b.cross(a);
+    let sine = cross.length();
+    if sine > 0.0 { sine.atan2(a.dot(b)) / sine * cross.dot(normal) } else { 0.0 }
 }
 
 /// A point of a spherical triangle, uniform by solid angle (Arvo 1995, "Stratified sampling of spherical triangles").

@@ -42,7 +42,7 @@ pub struct Exact;
 impl Pair for Exact {
     fn factor(&self, from: &Facet, to: &Facet, occlusion: &dyn Occlusion) -> Factor {
         let [value, error] = exchange(from, to).map(|x| x / from.area());
-        Factor { value, error: if occlusion.is_empty() { error } else { value + error } }
+        Factor { value, error: if occlusion.may_block(from, to) { value + error } else { error } }
     }
 }
 
@@ -200,15 +200,8 @@ fn over_both_areas(a: &Outline, b: &Outline) -> f64 {
 
 /// Lambert's formula for the larger polygon, integrated over the smaller.
 fn over_smaller_area(small: &Outline, large: &Outline) -> f64 {
-    let mut relative = large.corners.clone();
-    let mut sum = 0.0;
-    for (point, area) in small.points(6) {
-        for (r, c) in relative.iter_mut().zip(&large.corners) {
-            *r = *c - point;
-        }
-        sum += area * polygon::contour(&relative, small.normal);
-    }
-    sum
+    let lambert = |point| polygon::point_to_polygon(point, small.normal, &large.corners);
+    small.points(6).into_iter().map(|(point, area)| area * lambert(point)).sum()
 }
 
 #[cfg(test)]

@@ -3,9 +3,19 @@
 //! F_ij = (1/A_i) ∫_{A_i} ∫_{A_j} cos θ_i cos θ_j V/(π r²) dA_j dA_i (catalogue 0a), the share of what leaves i that
 //! arrives at j. Each method is a file and knows how far it is off.
 
+mod area;
+pub mod blockers;
+pub mod contour;
+pub mod cubature;
 mod edges;
 pub mod exact;
 mod gauss;
+pub mod lambert;
+pub mod nusselt;
+pub mod point;
+pub mod sampled;
+mod sight;
+mod smooth;
 
 use glam::DVec3;
 use radiosity_scene::Facet;
@@ -28,6 +38,11 @@ pub trait Occlusion: Sync {
     /// Whether nothing ever stands in the way.
     fn is_empty(&self) -> bool {
         false
+    }
+
+    /// Whether anything may stand between the front sides of two facets; where not, methods trace no segments.
+    fn may_block(&self, _from: &Facet, _to: &Facet) -> bool {
+        !self.is_empty()
     }
 }
 
