@@ -3,7 +3,10 @@
 
 use glam::DVec3;
 use radiosity_scene::Facet;
+use radiosity_transport::pair::blockers::Blockers;
+use radiosity_transport::pair::cubature::Cubature;
 use radiosity_transport::pair::exact::exact;
+use radiosity_transport::{Pair, Unoccluded};
 use serde_json::Value;
 
 fn cases(text: &str) -> Vec<Value> {
@@ -65,4 +68,34 @@ fn catalogue_17_rows_of_platonic_solids_sum_to_one() {
         count += 1;
     }
     assert!(count >= 3);
+}
+
+#[test]
+fn catalogue_17_polygons_by_cubature() {
+    for (case, [from, to], truth) in pairs(include_str!("data/view_factors.json")) {
+        let cubature = Cubature { tolerance: 1e-8, ..Cubature::default() };
+        let factor = cubature.factor(&from, &to, &Unoccluded);
+        assert!((factor.value - truth).abs() <= factor.error && factor.error <= 1e-8, "{}: {factor:?}", case["id"]);
+    }
+}
+
+/// Blockers of every kind: flat, upright, tilted, a box, and a wall that touches.
+#[test]
+fn catalogue_18_polygons_behind_blockers() {
+    let mut count = 0;
+    for (case, [from, to], truth) in pairs(include_str!("data/view_factors_occluded.json")) {
+        let blockers = case["blockers"].as_array().unwrap();
+        let blockers: Vec<Facet> = blockers.iter().map(|b| facet(&b["vertices"])).collect();
+        let blockers = Blockers::new(&blockers);
+        let free = exact(&from, &to) / from.area();
+        assert!((free - case["unoccluded"].as_f64().unwrap_or(free)).abs() < 1e-12);
+        let start = std::time::Instant::now();
+        let factor = Cubature { tolerance: 1e-4, ..Cubature::default() }.factor(&from, &to, &blockers);
+        println!("{} {:e} {:e} {:?}", case["id"], factor.value - truth, factor.error, start.elapsed());
+        assert!((factor.value - truth).abs() <= 1e-4 && factor.error <= 1e-4, "{}: {factor:?}", case["id"]);
+        assert!((factor.value - truth).abs() <= factor.error, "{}: {factor:?}", case["id"]);
+        assert!(factor.value <= free, "{}: {factor:?}", case["id"]);
+        count += 1;
+    }
+    assert!(count >= 8, "{count}");
 }

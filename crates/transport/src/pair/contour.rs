@@ -2,9 +2,8 @@
 //! formulation for radiative angle factors"; catalogue 17), n points on every edge of one outline times n + 1 on every
 //! edge of the other, so that no two coincide on a shared edge.
 //!
-//! Twelve digits for facets as far apart as they are wide; some three where they share an edge, on which the logarithm
-//! is singular and the error falls only like 1/n². The error is the difference from the rule of half as many points,
-//! which is off by more. Sees nothing between: where something may stand there, the error says so. [`super::exact`]
+//! Twelve digits for facets as far apart as they are wide; two where they share an edge, on which the logarithm
+//! is singular and the error falls only like 1/n. The error is predicted from the rule of half as many points. Sees nothing between: where something may stand there, the error says so. [`super::exact`]
 //! needs no points.
 
 use super::exact::facing;
@@ -13,6 +12,10 @@ use super::{Factor, Occlusion, Pair};
 use glam::DVec3;
 use radiosity_scene::Facet;
 use std::f64::consts::TAU;
+
+/// What the difference from half as many points is multiplied by: where the error falls like 1/n they are equal, but for
+/// oscillations up to twice as much.
+const SAFETY: f64 = 4.0;
 
 /// The contour integral by Gauss.
 #[derive(Clone, Copy, Debug)]
@@ -33,14 +36,15 @@ impl Pair for Contour {
         let Some([a, b]) = facing(from, to) else { return Factor::default() };
         let n = self.points.clamp(2, MOST - 1);
         let [value, coarse] = [n, n / 2].map(|n| integral(&a, &b, n) / from.area());
-        let error = (value - coarse).abs() + 1e-14;
+        let error = SAFETY * (value - coarse).abs() + 1e-14;
         let value = value.max(0.0);
         Factor { value, error: if occlusion.may_block(from, to) { value + error } else { error } }
     }
 }
 
 fn integral(a: &[DVec3], b: &[DVec3], n: usize) -> f64 {
-    let edges = |c: &[DVec3]| -> Vec<[DVec3; 2]> { (0..c.len()).map(|i| [c[i], c[(i + 1) % c.len()] - c[i]]).collect() };
+    let edges =
+        |c: &[DVec3]| -> Vec<[DVec3; 2]> { (0..c.len()).map(|i| [c[i], c[(i + 1) % c.len()] - c[i]]).collect() };
     let (of_a, of_b) = (edges(a), edges(b));
     let mut sum = 0.0;
     for [start_a, along_a] in &of_a {
@@ -77,8 +81,8 @@ mod tests {
             (rectangle(DVec3::Z, DVec3::Y, DVec3::X), 1e-10),
             (rectangle(v(0., 0., 0.1), DVec3::Y, DVec3::X), 0.05),
             (rectangle(v(3., 2., 0.5), v(-0.2, 0.7, 0.1), v(-0.5, 0., 1.)), 1e-13),
-            (rectangle(DVec3::ZERO, DVec3::Y, DVec3::Z), 2e-3),
-            (rectangle(DVec3::ZERO, DVec3::Y, v(0.7, 0., 0.7)), 2e-3),
+            (rectangle(DVec3::ZERO, DVec3::Y, DVec3::Z), 1e-2),
+            (rectangle(DVec3::ZERO, DVec3::Y, v(0.7, 0., 0.7)), 1e-2),
         ] {
             let truth = exact(&floor, &other);
             for points in [4, 8, 10, 20, 60] {
@@ -86,7 +90,7 @@ mod tests {
                 assert!((factor.value - truth).abs() <= factor.error, "{points}: {factor:?} for {truth}");
             }
             let off = (Contour::default().factor(&floor, &other, &Unoccluded).value - truth).abs();
-            assert!(off < digits, "{off:e} {digits:e}");
+            assert!(off < digits, "{off:e} {digits:e} {other:?}");
         }
     }
 }

@@ -82,17 +82,22 @@ fn order(a: &Facet, b: &Facet) -> Ordering {
 pub(super) fn facing(a: &Facet, b: &Facet) -> Option<[Vec<DVec3>; 2]> {
     let origin = a.corners()[0];
     let relative = |f: &Facet| f.corners().iter().map(|c| *c - origin).collect::<Vec<_>>();
-    let size = |f: &Facet| f.corners().iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
-    let touch = TOUCH * size(a).max(size(b));
+    let touch = touch(a, b);
     let (of_a, of_b) = (relative(a), relative(b));
     let clipped_a = before(&of_a, of_b[0], b.normal(), touch)?;
     let clipped_b = before(&of_b, of_a[0], a.normal(), touch)?;
     Some([clipped_a, clipped_b])
 }
 
+/// The height below which a corner of one facet is in the plane of the other.
+pub(super) fn touch(a: &Facet, b: &Facet) -> f64 {
+    let size = |f: &Facet| f.corners().iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
+    TOUCH * size(a).max(size(b))
+}
+
 /// The part of a polygon before a plane (Sutherland and Hodgman 1974). Corners less than `touch` from the plane are in
 /// it. A concave polygon may come back in pieces joined along the plane, where both ways cancel.
-fn before(corners: &[DVec3], point: DVec3, normal: DVec3, touch: f64) -> Option<Vec<DVec3>> {
+pub(super) fn before(corners: &[DVec3], point: DVec3, normal: DVec3, touch: f64) -> Option<Vec<DVec3>> {
     let heights = corners.iter().map(|c| {
         let height = (*c - point).dot(normal);
         if height.abs() <= touch { 0.0 } else { height }

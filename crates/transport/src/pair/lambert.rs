@@ -147,5 +147,6 @@ mod tests {
             let truth = exact(&from, &to) / from.area();
             let factor = Lambert.factor(&from, &to, &Unoccluded);
             assert!((factor.value - truth).abs() <= factor.error, "{truth} {factor:?} {k}");
+        }
     }
 }

@@ -16,6 +16,7 @@ pub mod point;
 pub mod sampled;
 mod sight;
 mod smooth;
+mod visible;
 
 use glam::DVec3;
 use radiosity_scene::Facet;

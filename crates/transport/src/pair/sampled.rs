@@ -107,8 +107,7 @@ impl Pair for GlobalLines {
         let apart = to.centroid() - from.centroid();
         let radius = (0.5 * (apart.length() + from.radius() + to.radius())).max(from.radius()).max(to.radius());
         let along = apart.normalize_or_zero();
-        let centre = (0.5 * (from.centroid() - from.radius() * along))
-            + 0.5 * (to.centroid() + to.radius() * along);
+        let centre = (0.5 * (from.centroid() - from.radius() * along)) + 0.5 * (to.centroid() + to.radius() * along);
         // A centre pulled to one side by unequal facets still holds both.
         let reach = |f: &Facet| f.centroid().distance(centre) + f.radius();
         let radius = radius.max(reach(from)).max(reach(to));
@@ -234,7 +233,14 @@ mod tests {
                 }
                 let runs: Vec<Factor> = (0..100)
                     .map(|seed| {
-                        let [method] = methods(seed, 1024).into_iter().filter(|(n, _)| *n == name).map(|(_, m)| m).collect::<Vec<_>>().try_into().ok().unwrap();
+                        let [method] = methods(seed, 1024)
+                            .into_iter()
+                            .filter(|(n, _)| *n == name)
+                            .map(|(_, m)| m)
+                            .collect::<Vec<_>>()
+                            .try_into()
+                            .ok()
+                            .unwrap();
                         method.factor(&floor(), &to, occlusion)
                     })
                     .collect();

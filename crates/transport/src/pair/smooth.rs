@@ -30,11 +30,8 @@ pub fn largest(from: &Facet, to: &Facet) -> f64 {
 /// m². Infinite where the facets may touch.
 pub fn variation(from: &Facet, to: &Facet, spread: f64) -> f64 {
     let gap = gap(from, to);
-    let bound = if is_cut(from, to) {
-        SLOPE * spread.sqrt() / gap.powi(3)
-    } else {
-        0.5 * CURVATURE * spread / gap.powi(4)
-    };
+    let bound =
+        if is_cut(from, to) { SLOPE * spread.sqrt() / gap.powi(3) } else { 0.5 * CURVATURE * spread / gap.powi(4) };
     to.area() / PI * bound
 }
 
