@@ -15,6 +15,9 @@ const TOUCH: f64 = 1e-9;
 /// Facets in a leaf of the tree: trying one costs about as much as a box.
 const LEAF: usize = 4;
 
+/// Most polygons that shadows are cut by: beyond, cutting all of them costs more than segments do.
+const FEW: usize = 48;
+
 /// Opaque facets.
 #[derive(Clone, Debug, Default)]
 pub struct Blockers {
@@ -30,6 +33,8 @@ struct Blocker {
     /// A point of the plane.
     origin: DVec3,
     corners: Vec<DVec3>,
+    /// Convex polygons that cover the facet.
+    parts: Vec<Vec<DVec3>>,
     /// Axes of the plane that the facet is projected along its widest side on.
     axes: [usize; 2],
     low: DVec3,
@@ -75,8 +80,8 @@ impl Blockers {
         self.build(first + half, count - half);
     }
 
-    /// Whether any facet in a box that `enters` passes the `test`.
-    fn any(&self, enters: impl Fn(DVec3, DVec3) -> bool, test: impl Fn(&Blocker) -> bool) -> bool {
+    /// Whether any facet in a box that `enters` passes the `test`, which sees each at most once.
+    fn any<'a>(&'a self, enters: impl Fn(DVec3, DVec3) -> bool, mut test: impl FnMut(&'a Blocker) -> bool) -> bool {
         let mut next = (!self.nodes.is_empty()).then_some(0);
         // Second children yet to visit: one for each level, and the halves halve.
         let (mut stack, mut depth) = ([0usize; 64], 0);
@@ -90,7 +95,7 @@ impl Blockers {
                         depth += 1;
                         next = Some(index + 1);
                     }
-                    None if self.facets[node.first..node.first + node.count].iter().any(&test) => return true,
+                    None if self.facets[node.first..node.first + node.count].iter().any(&mut test) => return true,
                     None => {}
                 }
             }
@@ -100,6 +105,26 @@ impl Blockers {
             }
         }
         false
+    }
+
+    /// Whether any facet that may stand between two others passes the `test`.
+    fn any_between<'a>(&'a self, from: &Facet, to: &Facet, mut test: impl FnMut(&'a Blocker) -> bool) -> bool {
+        let corners = || from.corners().iter().chain(to.corners());
+        let low = corners().fold(DVec3::INFINITY, |low, c| low.min(*c));
+        let high = corners().fold(DVec3::NEG_INFINITY, |high, c| high.max(*c));
+        let touch = TOUCH * low.distance(high);
+        let meets = |l: DVec3, h: DVec3| l.cmple(high + touch).all() && h.cmpge(low - touch).all();
+        self.any(meets, |blocker| {
+            // Not where the blocker lies behind either facet, or both facets on one side of it.
+            let is_behind = |f: &Facet| blocker.corners.iter().all(|c| f.height(*c) <= touch);
+            let heights = || corners().map(|c| (*c - blocker.origin).dot(blocker.normal));
+            meets(blocker.low, blocker.high)
+                && !is_behind(from)
+                && !is_behind(to)
+                && heights().any(|h| h > touch)
+                && heights().any(|h| h < -touch)
+                && test(blocker)
+        })
     }
 }
 
@@ -122,21 +147,16 @@ impl Occlusion for Blockers {
     }
 
     fn may_block(&self, from: &Facet, to: &Facet) -> bool {
-        let corners = || from.corners().iter().chain(to.corners());
-        let low = corners().fold(DVec3::INFINITY, |low, c| low.min(*c));
-        let high = corners().fold(DVec3::NEG_INFINITY, |high, c| high.max(*c));
-        let touch = TOUCH * low.distance(high);
-        let meets = |l: DVec3, h: DVec3| l.cmple(high + touch).all() && h.cmpge(low - touch).all();
-        self.any(meets, |blocker| {
-            // Not where the blocker lies behind either facet, or both facets on one side of it.
-            let is_behind = |f: &Facet| blocker.corners.iter().all(|c| f.height(*c) <= touch);
-            let heights = || corners().map(|c| (*c - blocker.origin).dot(blocker.normal));
-            meets(blocker.low, blocker.high)
-                && !is_behind(from)
-                && !is_behind(to)
-                && heights().any(|h| h > touch)
-                && heights().any(|h| h < -touch)
-        })
+        self.any_between(from, to, |_| true)
+    }
+
+    fn polygons(&self, from: &Facet, to: &Facet) -> Option<Vec<&[DVec3]>> {
+        let mut polygons = Vec::new();
+        let too_many = self.any_between(from, to, |blocker| {
+            polygons.extend(blocker.parts.iter().map(Vec::as_slice));
+            polygons.len() > FEW
+        });
+        (!too_many).then_some(polygons)
     }
 }
 
@@ -147,7 +167,12 @@ impl Blocker {
         let low = corners.iter().fold(DVec3::INFINITY, |low, c| low.min(*c));
         let high = corners.iter().fold(DVec3::NEG_INFINITY, |high, c| high.max(*c));
         let axes = [(axis + 1) % 3, (axis + 2) % 3];
-        Blocker { normal: facet.normal(), origin: corners[0], corners, axes, low, high }
+        let parts = if facet.is_convex() {
+            vec![corners.clone()]
+        } else {
+            facet.triangles().into_iter().map(Vec::from).collect()
+        };
+        Blocker { normal: facet.normal(), origin: corners[0], corners, parts, axes, low, high }
     }
 
     /// Whether the segment from `a` along `along` passes through, its ends not counted.

@@ -2,8 +2,11 @@
 //! inner integral of the form factor in closed form, the outer one by one point. As the hemicube does, it fails in
 //! proximity: 20 % for opposite faces of a cube. The error is a bound where the facets are apart, and an estimate from
 //! what the corners of `from` see where they are not. Where something may stand between, the closed form is multiplied
-//! by the share of `to` that segments from the centroid find visible.
+//! by the share of `to` that shadows leave visible from the centroid, cut exactly where polygons are all that stands
+//! there and else found by segments.
 
+use super::area::Places;
+use super::shadow::seen;
 use super::sight::obstructed;
 use super::smooth::{gap, is_cut, kernel, largest, spread, variation};
 use super::{Factor, Occlusion, Pair};
@@ -53,7 +56,7 @@ pub(super) fn from_centroid(
     // Where `to` is not small beside `from` and no plane cuts, the view changes little between a few points: no peak is
     // missed.
     if !is_cut(from, to) && to.radius() + gap(from, to) > from.radius() {
-        let (places, sequence) = (super::area::Places::new(from), Sequence::new(0, 0));
+        let (places, sequence) = (Places::new(from), Sequence::new(0, 0));
         let within = (0..LOOKS).map(|i| sequence.point(i).map(f64::from)).map(|[x, y, ..]| places.at(x, y));
         let looks = from.edges().flat_map(|[a, b]| [a, 0.5 * (a + b)]).chain(within);
         let off = |p: DVec3| (formula(from.centroid().lerp(p, TOWARDS)) - value).abs();
@@ -64,12 +67,18 @@ pub(super) fn from_centroid(
     if !occlusion.may_block(from, to) {
         return free;
     }
-    obstructed(free, visible_share(from.centroid(), from.normal(), to, occlusion), from, to, occlusion)
+    obstructed(free, visible_share(from, to, occlusion), from, to, occlusion)
 }
 
-/// The share of a facet that is visible from a point, weighted by the kernel.
-fn visible_share(point: DVec3, normal: DVec3, to: &Facet, occlusion: &dyn Occlusion) -> f64 {
-    let (places, sequence) = (super::area::Places::new(to), Sequence::new(0, 0));
+/// The share of what the centroid of `from` would see of `to` that it sees.
+fn visible_share(from: &Facet, to: &Facet, occlusion: &dyn Occlusion) -> f64 {
+    let (point, normal) = (from.centroid(), from.normal());
+    if let Some(blockers) = occlusion.polygons(from, to) {
+        let parts: Vec<Vec<DVec3>> = to.triangles().into_iter().map(Vec::from).collect();
+        let whole = seen(point, normal, &parts, &[]);
+        return if whole > 0.0 { seen(point, normal, &parts, &blockers) / whole } else { 0.0 };
+    }
+    let (places, sequence) = (Places::new(to), Sequence::new(0, 0));
     let (mut visible, mut all) = (0.0, 0.0);
     for i in 0..SEGMENTS {
         let [x, y, ..] = sequence.point(i).map(f64::from);

@@ -11,12 +11,16 @@ mod edges;
 pub mod exact;
 mod gauss;
 pub mod lambert;
+mod methods;
 pub mod nusselt;
 pub mod point;
 pub mod sampled;
+mod segments;
+mod shadow;
 mod sight;
 mod smooth;
-mod visible;
+
+pub use methods::{PAIRS, PairMethod, UnknownMethod};
 
 use glam::DVec3;
 use radiosity_scene::Facet;
@@ -44,6 +48,12 @@ pub trait Occlusion: Sync {
     /// Whether anything may stand between the front sides of two facets; where not, methods trace no segments.
     fn may_block(&self, _from: &Facet, _to: &Facet) -> bool {
         !self.is_empty()
+    }
+
+    /// The convex polygons, of either orientation, that may stand between the front sides of two facets, where polygons
+    /// are all there is and they are few; methods then cut shadows exactly. `None` where only segments can tell.
+    fn polygons(&self, _from: &Facet, _to: &Facet) -> Option<Vec<&[DVec3]>> {
+        None
     }
 }
 
