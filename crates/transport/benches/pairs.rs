@@ -3,7 +3,9 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{DQuat, DVec3};
 use radiosity_scene::Facet;
+use radiosity_transport::pair::blockers::Blockers;
 use radiosity_transport::pair::exact::exact;
+use radiosity_transport::{PairMethod, Unoccluded};
 use std::hint::black_box;
 
 fn square(turn: DQuat, shift: DVec3) -> Facet {
@@ -34,6 +36,21 @@ fn benches(c: &mut Criterion) {
     ] {
         assert!(exact(&floor, &other) > 0.0, "{name}");
         c.bench_function(&format!("exact {name}"), |b| b.iter(|| exact(black_box(&floor), black_box(&other))));
+    }
+
+    let ceiling = over(DQuat::IDENTITY, 1.0);
+    let half = DVec3::new(0.2, 0.3, 0.5);
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+    let blocker = Facet::new(corners.iter().map(|c| half + 0.5 * (tilted * *c)).collect()).unwrap();
+    let blockers = Blockers::new([&blocker]);
+    for name in ["lambert", "nusselt", "contour", "cubature"] {
+        let method = name.parse::<PairMethod>().unwrap().build();
+        c.bench_function(&format!("{name} opposite"), |b| {
+            b.iter(|| method.factor(black_box(&floor), black_box(&ceiling), &Unoccluded))
+        });
+        c.bench_function(&format!("{name} obstructed"), |b| {
+            b.iter(|| method.factor(black_box(&floor), black_box(&ceiling), &blockers))
+        });
     }
 }
 

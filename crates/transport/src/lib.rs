@@ -22,7 +22,7 @@ pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;
 pub use gather::Gather;
 pub use luminaires::{Light, Luminaires};
-pub use pair::{Factor, Occlusion, Pair, Unoccluded};
+pub use pair::{Factor, Occlusion, PAIRS, Pair, PairMethod, Unoccluded};
 pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers};
 pub use row::{Row, RowFactors};
 pub use rows::{HitTable, IdSpace};

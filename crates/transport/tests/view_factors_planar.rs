@@ -6,6 +6,8 @@ use radiosity_scene::Facet;
 use radiosity_transport::pair::blockers::Blockers;
 use radiosity_transport::pair::cubature::Cubature;
 use radiosity_transport::pair::exact::exact;
+use radiosity_transport::pair::nusselt;
+use radiosity_transport::polygon::point_to_polygon;
 use radiosity_transport::{Pair, Unoccluded};
 use serde_json::Value;
 
@@ -89,13 +91,51 @@ fn catalogue_18_polygons_behind_blockers() {
         let blockers = Blockers::new(&blockers);
         let free = exact(&from, &to) / from.area();
         assert!((free - case["unoccluded"].as_f64().unwrap_or(free)).abs() < 1e-12);
-        let start = std::time::Instant::now();
         let factor = Cubature { tolerance: 1e-4, ..Cubature::default() }.factor(&from, &to, &blockers);
-        println!("{} {:e} {:e} {:?}", case["id"], factor.value - truth, factor.error, start.elapsed());
         assert!((factor.value - truth).abs() <= 1e-4 && factor.error <= 1e-4, "{}: {factor:?}", case["id"]);
         assert!((factor.value - truth).abs() <= factor.error, "{}: {factor:?}", case["id"]);
         assert!(factor.value <= free, "{}: {factor:?}", case["id"]);
         count += 1;
     }
     assert!(count >= 8, "{count}");
+}
+
+/// Elements and polygons by Lambert's formula and by Nusselt's analog, one of them not flat; discs, an ellipse's polygon
+/// and spheres by Nusselt's analog.
+#[test]
+fn catalogue_16_and_19_elements() {
+    let mut count = 0;
+    for case in cases(include_str!("data/view_factors.json")) {
+        let Some([element, other]) =
+            case["surfaces"].as_array().and_then(|s| <&[Value; 2]>::try_from(s.as_slice()).ok())
+        else {
+            continue;
+        };
+        if element["type"] != "element" {
+            continue;
+        }
+        let (point, normal) = (vector(&element["position"]), vector(&element["normal"]).normalize());
+        let number = |name: &str| other[name].as_f64().unwrap();
+        let value = match other["type"].as_str() {
+            Some("polygon") => {
+                let corners: Vec<DVec3> = other["vertices"].as_array().unwrap().iter().map(vector).collect();
+                let value = point_to_polygon(point, normal, &corners);
+                if let Ok(facet) = Facet::new(corners) {
+                    let nusselt = nusselt::to_polygon(point, normal, &facet);
+                    assert!((nusselt - value).abs() < 1e-14, "{}: {nusselt} {value}", case["id"]);
+                }
+                value
+            }
+            Some("disk") => {
+                let axis = vector(&other["normal"]).normalize();
+                nusselt::to_disc(point, normal, vector(&other["center"]), axis, number("radius"))
+            }
+            Some("sphere") => nusselt::to_sphere(point, normal, vector(&other["center"]), number("radius")),
+            _ => continue,
+        };
+        let truth = case["value"].as_f64().unwrap();
+        assert!((value - truth).abs() < 1e-13, "{}: {value} for {truth}", case["id"]);
+        count += 1;
+    }
+    assert!(count >= 14, "{count}");
 }

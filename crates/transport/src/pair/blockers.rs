@@ -7,6 +7,7 @@
 use super::Occlusion;
 use glam::DVec3;
 use radiosity_scene::Facet;
+use std::cmp::Ordering;
 
 /// Height above a facet's plane, relative to the segment's length, below which an end touches it: a thousand times what
 /// rounding leaves of a hit point, a thousandth of what six-digit coordinates would notice.
@@ -33,6 +34,8 @@ struct Blocker {
     /// A point of the plane.
     origin: DVec3,
     corners: Vec<DVec3>,
+    /// How far corners are off the plane.
+    off: f64,
     /// Convex polygons that cover the facet.
     parts: Vec<Vec<DVec3>>,
     /// Axes of the plane that the facet is projected along its widest side on.
@@ -112,7 +115,7 @@ impl Blockers {
         let corners = || from.corners().iter().chain(to.corners());
         let low = corners().fold(DVec3::INFINITY, |low, c| low.min(*c));
         let high = corners().fold(DVec3::NEG_INFINITY, |high, c| high.max(*c));
-        let touch = TOUCH * low.distance(high);
+        let touch = (TOUCH * low.distance(high)).max(off_plane(from)).max(off_plane(to));
         let meets = |l: DVec3, h: DVec3| l.cmple(high + touch).all() && h.cmpge(low - touch).all();
         self.any(meets, |blocker| {
             // Not where the blocker lies behind either facet, or both facets on one side of it.
@@ -134,10 +137,10 @@ impl Occlusion for Blockers {
         let touch = TOUCH * along.length();
         let inverse = along.recip();
         let enters = |low: DVec3, high: DVec3| {
-            // Slabs, widened so that flat boxes are entered; 0 · ∞ compares as within.
+            // Slabs, widened so that flat boxes are entered; 0 · ∞, which compares with nothing, is within.
             let (s, t) = ((low - touch - a) * inverse, (high + touch - a) * inverse);
             let (near, far) = (s.min(t).max_element(), s.max(t).min_element());
-            !(near.max(0.0) > far.min(1.0))
+            near.max(0.0).partial_cmp(&far.min(1.0)) != Some(Ordering::Greater)
         };
         !self.any(enters, |blocker| blocker.blocks(a, along, touch))
     }
@@ -172,13 +175,15 @@ impl Blocker {
         } else {
             facet.triangles().into_iter().map(Vec::from).collect()
         };
-        Blocker { normal: facet.normal(), origin: corners[0], corners, parts, axes, low, high }
+        let off = off_plane(facet);
+        Blocker { normal: facet.normal(), origin: corners[0], corners, off, parts, axes, low, high }
     }
 
     /// Whether the segment from `a` along `along` passes through, its ends not counted.
     fn blocks(&self, a: DVec3, along: DVec3, touch: f64) -> bool {
         let height = (a - self.origin).dot(self.normal);
         let end = height + along.dot(self.normal);
+        let touch = touch.max(2.0 * self.off);
         if height.abs() <= touch || end.abs() <= touch || (height > 0.0) == (end > 0.0) {
             return false;
         }
@@ -189,6 +194,11 @@ impl Blocker {
     fn contains(&self, p: DVec3) -> bool {
         contains(&self.corners, p, self.axes)
     }
+}
+
+/// How far a facet's corners are off its plane: coordinates of few digits leave some.
+fn off_plane(facet: &Facet) -> f64 {
+    facet.corners().iter().map(|c| facet.height(*c).abs()).fold(0.0, f64::max)
 }
 
 /// Whether a point of a polygon's plane is inside it, as projected on two coordinate axes.
@@ -284,6 +294,18 @@ mod tests {
             blocked += usize::from(!clear);
         }
         assert!((200..1800).contains(&blocked), "{blocked}");
+    }
+
+    /// Coordinates of few digits leave corners off the plane; a facet still does not hide what starts on it.
+    #[test]
+    fn facets_that_are_not_quite_flat_do_not_block_themselves() {
+        let bent = facet(&[[0., 0., 0.], [1., 0., 4e-6], [1., 1., 0.], [0., 1., 4e-6]]);
+        let ceiling = facet(&[[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]]);
+        let blockers = Blockers::new([&bent, &ceiling]);
+        assert!(!blockers.may_block(&bent, &ceiling));
+        for [a, b, c] in bent.triangles() {
+            assert!(blockers.is_clear((a + b + c) / 3.0, DVec3::new(0.4, 0.6, 1.0)));
+        }
     }
 
     #[test]

@@ -14,13 +14,14 @@ use glam::DVec3;
 /// Sine below which edges count as parallel: coordinates in double precision say no more.
 const PARALLEL: f64 = 1e-13;
 
-/// Digits that Gauss rules are chosen for, as −ln of the relative error: 1e-15, a few roundings.
-const DIGITS: f64 = 34.5;
+/// Digits that Gauss rules are chosen for, as −ln ρ⁻²ⁿ: 1e-13, as the integrand's singularities are logarithms, whose
+/// errors are smaller by 1/n².
+const DIGITS: f64 = 30.0;
 
 /// Sum of the distances of an edge's ends from the other edge, relative to its length, from which on Gauss is used:
 /// for skew edges where some ten points suffice, which cost as much as eight dilogarithms; for parallel ones where the
 /// second difference of the closed form begins to cancel.
-const APART: f64 = 2.1;
+const APART: f64 = 1.9;
 const APART_PARALLEL: f64 = 6.0;
 
 /// Ratio of lengths beyond which the longer edge is divided, so that no difference cancels, and how many lengths of the
