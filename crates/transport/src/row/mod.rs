@@ -1,9 +1,34 @@
 //! Rows of form factors: all that one facet sees, at once.
 //!
 //! A row method looks out from a facet and says what share of its view each facet takes up. Each knows where it
-//! fails (proximity, aliasing, truncation) and predicts by how much.
+//! fails (proximity, aliasing, truncation) and predicts by how much. [`RowMethod`] has them by name; those that project
+//! on faces share the item buffer (`buffer`), the weights of cells (`face`) and the bookkeeping of errors (`look`).
+
+mod buffer;
+mod cubic_tetrahedron;
+mod face;
+mod global_cube;
+mod hemicube;
+mod hemisphere;
+mod look;
+mod matrix;
+mod method;
+mod points;
+mod single_plane;
+mod view;
+
+pub use cubic_tetrahedron::CubicTetrahedron;
+pub use face::Weights;
+pub use global_cube::{DirectionalRow, GlobalCube};
+pub use hemicube::Hemicube;
+pub use hemisphere::Hemisphere;
+pub use look::{Look, Repair};
+pub use matrix::RowMatrix;
+pub use method::{RowMethod, UnknownRowMethod};
+pub use single_plane::SinglePlane;
 
 use crate::pair::Factor;
+use crate::{Progress, Stopped};
 use radiosity_scene::Enclosure;
 
 /// A row of form factors.
@@ -21,4 +46,15 @@ pub struct RowFactors {
 pub trait Row: Sync {
     /// The row of facet `from`.
     fn row(&self, from: usize, enclosure: &Enclosure) -> RowFactors;
+
+    /// All rows, on rayon's threads; the same for any number of them. What rows have in common is made once.
+    ///
+    /// # Errors
+    /// [`Stopped`] if `progress` says so, which is told of every row.
+    fn rows(&self, enclosure: &Enclosure, progress: &dyn Progress) -> Result<RowMatrix, Stopped> {
+        RowMatrix::collect(enclosure, progress, || (), |(), from| self.row(from, enclosure))
+    }
 }
+
+#[cfg(test)]
+mod tests;
