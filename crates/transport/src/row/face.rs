@@ -52,7 +52,7 @@ impl Face {
         let row = ((point.y / point.z - self.window[2]) / height).floor();
         let inside = |at: f64, len: usize| at >= 0.0 && at < len as f64;
         let is_seen = point.z > 0.0 && inside(column, self.cells[0]) && inside(row, self.cells[1]);
-        is_seen.then_some(row as usize * self.cells[0] + column as usize)
+        is_seen.then(|| row as usize * self.cells[0] + column as usize)
     }
 
     /// **v** of every cell, rows from below.

@@ -9,7 +9,8 @@
 //!   all that it could take, 1/π ∫cos cos/r².
 //! - *Proximity*: a few points stand for the whole facet. One point is compared with 2 × 2 others at half the
 //!   resolution, which costs as many cells again; k × k with half as many each way, which is off by at least twice as
-//!   much, as errors fall with h² and beside edges of shadows with h.
+//!   much, as errors fall with h² and beside edges of shadows with h. Facets nearer than the points are to each other
+//!   may escape both, so Lambert's integral is asked about them at more points, as if nothing hid them.
 //! - *Truncation*: where the surface does not go down to the horizon.
 //!
 //! All of these watch what is seen: an obstacle that shows in no cell from any eye point stays unknown.
@@ -67,6 +68,16 @@ const MOST_CELLS: usize = 1024;
 
 /// Polygons seen more obliquely than this are lines.
 const EDGE_ON: f64 = 1e-12;
+
+/// How much more of a facet that was missed other points than the eye point may see: a facet as near as that is not missed.
+const ELSEWHERE: f64 = 0.1;
+
+/// Cells below which a facet's image may be narrower than they are, so that its boundary is not where they differ.
+const FEW: u32 = 32;
+
+/// How small facets are, against their distance, that their centre stands for in values and in doubts.
+const FINE: f64 = 1e-3;
+const ROUGH: f64 = 0.03;
 
 /// A method that projects what is around on faces.
 pub(super) trait Projection: Sync {
@@ -217,8 +228,8 @@ impl<'a> Gaze<'a> {
             let find = |k: usize, level: usize| &known.iter().find(|(key, _)| *key == (k, level)).expect("just made").1;
             let average = find(k, level);
             let (other, scale) = if k == 1 { (find(2, 0), 1.5) } else { (find(k / 2, level), 0.5) };
-            let proximity: Vec<f64> =
-                average.values.iter().zip(&other.values).map(|(a, b)| scale * (a - b).abs()).collect();
+            let gap = |(j, (a, b)): (usize, (&f64, &f64))| (scale * (a - b).abs()).max(self.nearness(j, k, *a));
+            let proximity: Vec<f64> = average.values.iter().zip(&other.values).enumerate().map(gap).collect();
             if let Repair::UntilError(tolerance) = look.repair {
                 let errors = proximity.iter().zip(&average.aliasing).map(|(p, a)| [p + a, *p, *a]);
                 let [worst, near, coarse] = errors.fold([0.0; 3], |worst, e| if e[0] > worst[0] { e } else { worst });
@@ -234,6 +245,25 @@ impl<'a> Gaze<'a> {
             }
             return self.finish(average, &proximity);
         }
+    }
+
+    /// How far k × k eye points are off for a facet that is nearer than they are to each other and not hidden from all of
+    /// them, as if nothing hid it: by more points, four times as many each way while k is small.
+    fn nearness(&self, j: usize, k: usize, value: f64) -> f64 {
+        let facets = &self.view.enclosure.facets;
+        let (own, other) = (&facets[self.from], &facets[j]);
+        let spacing = 2.0 * own.radius() / k as f64;
+        let distance = own.centroid().distance(other.centroid()) - own.radius() - other.radius();
+        if value == 0.0 || distance > spacing {
+            return 0.0;
+        }
+        let mean = |k: usize| -> f64 {
+            let points = eye_points(own, k).into_iter();
+            points.map(|(eye, share)| share * self.view.potential(eye, own.normal(), j, ROUGH)).sum()
+        };
+        // What remains at the finer points, falling with the spacing at least.
+        let finer = (4 * k).min(16).max(2 * k);
+        (mean(k) - mean(finer)).abs() * finer as f64 / (finer - k) as f64
     }
 
     fn finish(&self, average: &Average, proximity: &[f64]) -> RowFactors {
@@ -342,17 +372,21 @@ impl<'a> Gaze<'a> {
         for (j, tally) in tallies[..n].iter().enumerate() {
             let Tally { mut value, mut doubt, .. } = *tally;
             let is_missed = tally.inside && tally.drawn == 0;
-            let is_exact = is_analytic && is_whole && tally.drawn > 0 && !is_hidden(tally);
+            let is_thin = tally.inside && tally.drawn < FEW && tally.seen > 0;
+            let is_exact = is_analytic && is_whole && (is_missed || (tally.drawn > 0 && !is_hidden(tally)));
             let is_cut = !is_whole && tally.outside;
-            if is_missed || is_exact || is_cut {
-                let potential = share * self.view.potential(eye, normal, j);
+            if is_missed || is_thin || is_exact || is_cut {
+                let potential = share * self.view.potential(eye, normal, j, if is_exact { FINE } else { ROUGH });
                 if is_cut {
                     average.truncation[j] += (potential - value).clamp(0.0, share * (1.0 - captured));
                 }
                 if is_missed {
-                    doubt = potential;
+                    doubt = (1.0 + ELSEWHERE) * potential;
+                } else if is_thin && !is_cut {
+                    let visible = f64::from(tally.seen) / f64::from(tally.drawn);
+                    doubt = doubt.max((visible * potential - value).abs());
                 }
-                if is_exact || (is_missed && is_analytic && tally.glimpsed) {
+                if is_exact && (tally.glimpsed || !is_missed) {
                     value = potential;
                     doubt = if hides { doubt } else { 0.0 };
                 }

@@ -88,19 +88,23 @@ impl<'a> View<'a> {
         all.iter().filter(is_ahead).copied().collect()
     }
 
-    /// What a facet would take of the view from `eye` if nothing stood in the way.
-    pub fn potential(&self, eye: DVec3, normal: DVec3, to: usize) -> f64 {
-        // Where the facet is this much smaller than far, the cosines and the distance of its centre do.
-        const SMALL: f64 = 0.1;
+    /// What a facet would take of the view from `eye` if nothing stood in the way. Where its radius is less than `small`
+    /// times as large as it is far, its centre stands for it, which is off by some `small`² of it.
+    pub fn potential(&self, eye: DVec3, normal: DVec3, to: usize, small: f64) -> f64 {
         let facet = &self.enclosure.facets[to];
         let ray = facet.centroid() - eye;
         let distance = ray.length();
-        if self.radius[to] < SMALL * distance {
+        if self.radius[to] < small * distance {
             let (cosine, other) = (ray.dot(normal) / distance, -ray.dot(facet.normal()) / distance);
-            if cosine > SMALL || cosine < -SMALL {
+            if cosine.abs() > small {
                 return cosine.max(0.0) * other.max(0.0) * facet.area() / (std::f64::consts::PI * distance * distance);
             }
         }
-        facet.triangles().into_iter().map(|t| point_to_triangle(eye, normal, t)).sum()
+        let lambert = |corners: [DVec3; 3]| point_to_triangle(eye, normal, corners);
+        if !facet.is_convex() {
+            return facet.triangles().into_iter().map(lambert).sum();
+        }
+        let corners = facet.corners();
+        corners[1..].windows(2).map(|pair| lambert([corners[0], pair[0], pair[1]])).sum()
     }
 }
