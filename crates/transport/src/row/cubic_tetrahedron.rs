@@ -7,7 +7,8 @@
 //! nothing; theirs is n⁻² of all and goes to the others. Otherwise it fails where the hemicube fails.
 
 use super::face::Face;
-use super::look::{Look, Projection};
+use super::look::Look;
+use super::surface::Projection;
 use glam::DVec3;
 
 /// The cubic tetrahedron.

@@ -1,8 +1,8 @@
 //! Faces of a projection surface and what their cells weigh.
 //!
-//! A face is a window on a plane at distance 1 from the eye. The direction through (x, y) is p = (x, y, 1), |p|² = 1 + x²
-//! + y² = r², and a cell ΔA of the window stands for ∫ω̂ dω = ∫ p/r⁴ dA =: **v**, a vector. A facet of normal m gives off
-//! ΔF = m·v/π through it, whichever way the window is turned: for the top of a hemicube ΔA/(π(x² + y² + 1)²), for a side
+//! A face is a window on a plane at distance 1 from the eye. The direction through (x, y) is p = (x, y, 1), its square
+//! r² = 1 + x² + y², and a cell ΔA of the window stands for the vector v = ∫ p/r dω = ∫ p/r⁴ dA. A facet of normal m gives
+//! off ΔF = m·v/π through it, whichever way the window is turned: for the top of a hemicube ΔA/(π(x² + y² + 1)²), for a side
 //! y ΔA/(π(x² + y² + 1)²) (Cohen and Greenberg 1985; catalogue 23), and so on for the other surfaces.
 //!
 //! The integral has a closed form, so the weights of a whole hemisphere sum to one; the classic weights take the integrand
@@ -55,7 +55,7 @@ impl Face {
         is_seen.then(|| row as usize * self.cells[0] + column as usize)
     }
 
-    /// **v** of every cell, rows from below.
+    /// v of every cell, rows from below.
     pub fn vectors(&self, weights: Weights) -> Vec<DVec3> {
         let [columns, rows] = self.cells;
         let [width, height] = self.pitch();

@@ -8,7 +8,9 @@
 //! out. It costs up to six faces where the hemicube has three cubes' faces worth of cells, and cannot be turned.
 
 use super::face::{Face, Weights};
-use super::look::{Atlas, Gaze, Look, Projection, Repair, Scratch, quantised};
+use super::glance::{Scratch, quantised};
+use super::look::{Gaze, Look, Repair};
+use super::surface::{Atlas, Projection};
 use super::view::View;
 use glam::DVec3;
 use radiosity_scene::Enclosure;

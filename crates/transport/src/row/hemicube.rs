@@ -7,7 +7,8 @@
 //! [`Look`] for what can be done about them.
 
 use super::face::{Face, Weights};
-use super::look::{Look, Projection};
+use super::look::Look;
+use super::surface::Projection;
 use glam::DVec3;
 
 /// The hemicube.

@@ -168,8 +168,8 @@ impl Row for Hemisphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::view::View;
     use crate::row::tests::{ADJACENT, OPPOSITE, box_of, room_with_block};
+    use crate::row::view::View;
 
     /// Mean and spread over seeds against the exact factors of a cube: no bias (five standard errors, one false alarm in
     /// a million), never worse than independent rays, and better the more there are.
@@ -205,14 +205,16 @@ mod tests {
     #[test]
     fn catalogue_28_errors_fall_faster_than_of_random_rays() {
         let mut cube = box_of(DVec3::ONE, 4);
-        let corners = [[0., 0.], [1., 0.], [1., 1.], [0., 1.]].map(|[x, y]| DVec3::new(0.44 + 1e-3 * x, 0.4 + 1e-3 * y, 0.1));
+        let corners =
+            [[0., 0.], [1., 0.], [1., 1.], [0., 1.]].map(|[x, y]| DVec3::new(0.44 + 1e-3 * x, 0.4 + 1e-3 * y, 0.1));
         let small = Facet::new(corners.to_vec()).unwrap();
         let to = |j: usize| View::new(&cube).potential(small.centroid(), small.normal(), j, 0.0);
         let exact: Vec<f64> = (0..cube.facets.len()).map(to).collect();
         cube.add("small", small);
         let root = |rays: usize| {
             let rows = (0..32).map(|seed| Hemisphere { rays, seed, ..Hemisphere::default() }.row(96, &cube));
-            let square = |row: RowFactors| row.factors.iter().zip(&exact).map(|(f, e)| (f.value - e).powi(2)).sum::<f64>();
+            let square =
+                |row: RowFactors| row.factors.iter().zip(&exact).map(|(f, e)| (f.value - e).powi(2)).sum::<f64>();
             (rows.map(square).sum::<f64>() / 32.0).sqrt()
         };
         let slope = (root(1 << 13) / root(1 << 5)).ln() / 256f64.ln();

@@ -15,9 +15,9 @@
 //!
 //! All of these watch what is seen: an obstacle that shows in no cell from any eye point stays unknown.
 
-use super::buffer::{ItemBuffer, Outline};
-use super::face::{Face, Weights};
+use super::glance::{Eye, Observer, Scratch, Tally};
 use super::points::eye_points;
+use super::surface::{Atlas, Projection};
 use super::view::View;
 use super::{Row, RowFactors, RowMatrix};
 use crate::pair::Factor;
@@ -25,7 +25,6 @@ use crate::{Progress, Stopped};
 use glam::DVec3;
 use radiosity_scene::Enclosure;
 use radiosity_trace::sampling::{frame, hash, unit};
-use std::sync::OnceLock;
 
 /// How a row is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,10 +63,6 @@ pub enum Repair {
 
 /// Points along a side and cells beyond which [`Repair::UntilError`] gives up: a row then takes some seconds.
 const MOST_POINTS: usize = 32;
-const MOST_CELLS: usize = 1024;
-
-/// Polygons seen more obliquely than this are lines.
-const EDGE_ON: f64 = 1e-12;
 
 /// How much more of a facet that was missed other points than the eye point may see: a facet as near as that is not missed.
 const ELSEWHERE: f64 = 0.1;
@@ -78,115 +73,6 @@ const FEW: u32 = 32;
 /// How small facets are, against their distance, that their centre stands for in values and in doubts.
 const FINE: f64 = 1e-3;
 const ROUGH: f64 = 0.03;
-
-/// A method that projects what is around on faces.
-pub(super) trait Projection: Sync {
-    fn look(&self) -> Look;
-    /// Faces of the surface; forward along z is the facet's normal.
-    fn faces(&self, resolution: usize) -> Vec<Face>;
-    fn weights(&self) -> Weights {
-        Weights::Exact
-    }
-    /// Faces keep to the world's axes, whatever the facet's normal.
-    fn is_world_aligned(&self) -> bool {
-        false
-    }
-    /// Share of the hemisphere that the faces take in.
-    fn captured(&self) -> f64 {
-        1.0
-    }
-    fn renormalises(&self) -> bool {
-        false
-    }
-}
-
-/// The faces of a surface at one resolution.
-pub(super) struct Level {
-    pub faces: Vec<Face>,
-    vectors: Vec<Vec<DVec3>>,
-    /// What cells weigh, where that is the same for all facets.
-    fixed: Option<Vec<Vec<f64>>>,
-}
-
-/// The faces of a surface at half its resolution, the whole, twice, ….
-pub(super) struct Atlas<'a> {
-    projection: &'a dyn Projection,
-    levels: Vec<OnceLock<Level>>,
-}
-
-impl Atlas<'_> {
-    pub fn new(projection: &dyn Projection) -> Atlas<'_> {
-        let resolution = resolution_of(projection);
-        let finer = (1..).take_while(|level| resolution << level <= MOST_CELLS).count();
-        Atlas { projection, levels: (0..2 + finer).map(|_| OnceLock::new()).collect() }
-    }
-
-    pub fn level(&self, level: usize) -> &Level {
-        self.levels[level].get_or_init(|| {
-            let resolution = (resolution_of(self.projection) << level) / 2;
-            let faces = self.projection.faces(resolution.next_multiple_of(2));
-            let vectors: Vec<_> = faces.iter().map(|face| face.vectors(self.projection.weights())).collect();
-            let level = Level { faces, vectors, fixed: None };
-            if self.projection.is_world_aligned() {
-                return level;
-            }
-            let fixed = Some(level.weights(self.projection, DVec3::Z));
-            Level { vectors: Vec::new(), fixed, ..level }
-        })
-    }
-}
-
-/// An even number of at least four cells, and no more than memory allows.
-fn resolution_of(projection: &dyn Projection) -> usize {
-    projection.look().resolution.clamp(4, 4 * MOST_CELLS).next_multiple_of(2)
-}
-
-impl Level {
-    /// What each cell weighs for a facet of normal `normal`. Exact weights of a surface that takes in the whole
-    /// hemisphere sum to one: where the horizon cuts through cells, that takes n⁻² of correction.
-    pub fn weights(&self, projection: &dyn Projection, normal: DVec3) -> Vec<Vec<f64>> {
-        let faces = self.faces.iter().zip(&self.vectors);
-        let mut weights: Vec<_> = faces.map(|(face, vectors)| face.weights(vectors, normal)).collect();
-        if projection.weights() == Weights::Exact && projection.captured() >= 1.0 {
-            let sum: f64 = weights.iter().flatten().sum();
-            weights.iter_mut().flatten().for_each(|weight| *weight /= sum);
-        }
-        weights
-    }
-}
-
-/// Sees each face as it was drawn: its number, the items of its cells, their weights, the share of the eye point.
-pub(super) type Observer<'a> = &'a mut dyn FnMut(usize, &[u32], &[f64], f64);
-
-/// Working memory of one thread.
-#[derive(Default)]
-pub(super) struct Scratch {
-    buffer: ItemBuffer,
-    vertices: Vec<DVec3>,
-    /// Planes of the face's pyramid that each vertex lies outside of.
-    outside: Vec<u8>,
-    outline: Vec<DVec3>,
-    /// Whether what lies outside of the faces is missed.
-    is_truncated: bool,
-    /// Per facet, and last what shows nothing.
-    tallies: Vec<Tally>,
-    /// Polygons of the face between all cell centres: owner, cell and reciprocal depth of the middle.
-    between: Vec<(u32, usize, f64)>,
-}
-
-/// What one eye point sees of a facet.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tally {
-    value: f64,
-    doubt: f64,
-    /// Cells that its image covers, and those of them that show it.
-    drawn: u32,
-    seen: u32,
-    /// Some of it may lie inside the surface, some outside; its middle lies between cell centres in front of all else.
-    inside: bool,
-    outside: bool,
-    glimpsed: bool,
-}
 
 /// What the eye points of a facet see, on average.
 #[derive(Clone, Debug, Default)]
@@ -233,7 +119,7 @@ impl<'a> Gaze<'a> {
             if let Repair::UntilError(tolerance) = look.repair {
                 let errors = proximity.iter().zip(&average.aliasing).map(|(p, a)| [p + a, *p, *a]);
                 let [worst, near, coarse] = errors.fold([0.0; 3], |worst, e| if e[0] > worst[0] { e } else { worst });
-                let (may_refine, may_add) = (level + 1 < self.atlas.levels.len(), k < MOST_POINTS);
+                let (may_refine, may_add) = (level + 1 < self.atlas.len(), k < MOST_POINTS);
                 if worst > tolerance && (may_refine || may_add) {
                     if may_refine && (coarse > near || !may_add) {
                         level += 1
@@ -288,6 +174,7 @@ impl<'a> Gaze<'a> {
     pub fn average(&mut self, k: usize, level: usize, observe: Observer) -> Average {
         let projection = self.atlas.projection;
         let look = projection.look();
+        self.scratch.watches_rim = projection.captured() < 1.0;
         let facet = &self.view.enclosure.facets[self.from];
         let level_of_faces = self.atlas.level(level);
         let own;
@@ -306,8 +193,8 @@ impl<'a> Gaze<'a> {
         let is_repaired = matches!(look.repair, Repair::UntilError(_));
         let spin = look.spin.or((level == 0 || is_repaired).then_some(0)).filter(|_| !projection.is_world_aligned());
         let points = eye_points(facet, k);
-        for (index, (eye, share)) in points.iter().enumerate() {
-            let base = match (projection.is_world_aligned(), spin) {
+        for (index, (place, share)) in points.iter().enumerate() {
+            let axes = match (projection.is_world_aligned(), spin) {
                 (true, _) => [DVec3::X, DVec3::Y, DVec3::Z],
                 (false, None) => frame(facet.normal()),
                 (false, Some(seed)) => {
@@ -317,8 +204,9 @@ impl<'a> Gaze<'a> {
                     [cosine * u + sine * v, cosine * v - sine * u, normal]
                 }
             };
-            self.glance(level_of_faces, weights, (*eye, *share), &base, observe);
-            self.settle((*eye, *share), captured, look.repair != Repair::None, &mut average);
+            let eye = Eye { place: *place, share: *share, axes };
+            self.scratch.glance((self.view, &self.ahead), (level_of_faces, weights), &eye, observe);
+            self.settle(&eye, captured, &mut average);
         }
         // Doubts of turned surfaces are independent: three standard deviations of as many uniform ones.
         if spin.is_some() && points.len() > 3 {
@@ -328,42 +216,10 @@ impl<'a> Gaze<'a> {
         average
     }
 
-    /// Draws all faces from one eye point and counts.
-    fn glance(
-        &mut self,
-        level: &Level,
-        weights: &[Vec<f64>],
-        (eye, share): (DVec3, f64),
-        base: &[DVec3; 3],
-        observe: Observer,
-    ) {
-        let (view, scratch) = (self.view, &mut *self.scratch);
-        let nothing = view.nothing();
-        scratch.is_truncated = self.atlas.projection.captured() < 1.0;
-        scratch.tallies.clear();
-        scratch.tallies.resize(nothing as usize + 1, Tally::default());
-        for (number, (face, weights)) in level.faces.iter().zip(weights).enumerate() {
-            if weights.iter().all(|weight| *weight == 0.0) {
-                continue;
-            }
-            let axes = face.frame.map(|axis| base[0] * axis.x + base[1] * axis.y + base[2] * axis.z);
-            scratch.project(view, face, eye, &axes);
-            scratch.buffer.clear(face, nothing);
-            scratch.between.clear();
-            for polygon in self.ahead.iter().map(|p| &view.polygons[*p as usize]) {
-                scratch.draw(view, face, (polygon.owner, polygon.normal), view.corners(polygon), eye, &axes);
-            }
-            for (owner, cell, nearness) in scratch.between.drain(..) {
-                scratch.tallies[owner as usize].glimpsed |= nearness >= scratch.buffer.depths[cell];
-            }
-            tally(face, &scratch.buffer.items, weights, share, &mut scratch.tallies);
-            observe(number, &scratch.buffer.items, weights, share);
-        }
-    }
-
     /// Adds what one eye point saw to the average.
-    fn settle(&self, (eye, share): (DVec3, f64), captured: f64, is_analytic: bool, average: &mut Average) {
-        let tallies = &self.scratch.tallies;
+    fn settle(&self, eye: &Eye, captured: f64, average: &mut Average) {
+        let (tallies, share) = (&self.scratch.tallies, eye.share);
+        let is_analytic = self.atlas.projection.look().repair != Repair::None;
         let normal = self.view.enclosure.facets[self.from].normal();
         let (is_whole, n) = (self.atlas.projection.captured() >= 1.0, self.view.nothing() as usize);
         let is_hidden = |t: &Tally| t.seen < t.drawn;
@@ -376,7 +232,7 @@ impl<'a> Gaze<'a> {
             let is_exact = is_analytic && is_whole && (is_missed || (tally.drawn > 0 && !is_hidden(tally)));
             let is_cut = !is_whole && tally.outside;
             if is_missed || is_thin || is_exact || is_cut {
-                let potential = share * self.view.potential(eye, normal, j, if is_exact { FINE } else { ROUGH });
+                let potential = share * self.view.potential(eye.place, normal, j, if is_exact { FINE } else { ROUGH });
                 if is_cut {
                     average.truncation[j] += (potential - value).clamp(0.0, share * (1.0 - captured));
                 }
@@ -395,91 +251,6 @@ impl<'a> Gaze<'a> {
             average.aliasing[j] += doubt;
         }
     }
-}
-
-impl Scratch {
-    /// Takes all vertices to the frame of a face.
-    fn project(&mut self, view: &View, face: &Face, eye: DVec3, axes: &[DVec3; 3]) {
-        let [left, right, low, high] = face.window;
-        self.vertices.clear();
-        self.outside.clear();
-        for vertex in &view.vertices {
-            let to = *vertex - eye;
-            let p = DVec3::new(axes[0].dot(to), axes[1].dot(to), axes[2].dot(to));
-            self.vertices.push(p);
-            let outside = [p.x < left * p.z, p.x > right * p.z, p.y < low * p.z, p.y > high * p.z, p.z <= 0.0];
-            self.outside.push(outside.iter().fold(0, |code, o| 2 * code + u8::from(*o)));
-        }
-    }
-
-    fn draw(
-        &mut self,
-        view: &View,
-        face: &Face,
-        (owner, normal): (u32, DVec3),
-        corners: &[u32],
-        eye: DVec3,
-        axes: &[DVec3; 3],
-    ) {
-        let codes = || corners.iter().map(|c| self.outside[*c as usize]);
-        let (all, any) = (codes().fold(u8::MAX, |a, b| a & b), codes().fold(0, |a, b| a | b));
-        if all != 0 && !self.is_truncated {
-            return;
-        }
-        let to = view.vertices[corners[0] as usize] - eye;
-        let offset = normal.dot(to);
-        let item = if offset < 0.0 { owner } else { view.nothing() };
-        let tally = &mut self.tallies[item as usize];
-        tally.outside |= any != 0;
-        if all != 0 || offset.abs() <= EDGE_ON * to.length() {
-            return;
-        }
-        tally.inside = true;
-        self.outline.clear();
-        self.outline.extend(corners.iter().map(|c| self.vertices[*c as usize]));
-        let normal = DVec3::from_array(axes.map(|axis| axis.dot(normal)));
-        let outline = Outline { corners: &self.outline, normal, offset };
-        let covered = self.buffer.draw(face, &outline, item);
-        tally.drawn += covered;
-        if covered == 0 && item != view.nothing() {
-            let middle = self.outline.iter().sum::<DVec3>() / self.outline.len() as f64;
-            if let Some(cell) = face.cell(middle) {
-                self.between.push((owner, cell, 1.0 / middle.z));
-            }
-        }
-    }
-}
-
-/// Adds up the cells of a face: values, cells seen, and half of each pair of neighbours that show different things. Sums
-/// of multiples of 2⁻⁵² up to one are exact, so these come out alike in whatever order and groups they are taken.
-fn tally(face: &Face, items: &[u32], weights: &[f64], share: f64, tallies: &mut [Tally]) {
-    let columns = face.cells[0];
-    let rows = items.chunks_exact(columns).zip(weights.chunks_exact(columns));
-    for (row, (here, weigh)) in rows.enumerate() {
-        for (item, weight) in here.iter().zip(weigh) {
-            let tally = &mut tallies[*item as usize];
-            tally.value += quantised(share * weight);
-            tally.seen += 1;
-        }
-        let mut differ = |[a, b]: [u32; 2], weight: f64| {
-            if a != b {
-                tallies[a as usize].doubt += 0.25 * share * weight;
-                tallies[b as usize].doubt += 0.25 * share * weight;
-            }
-        };
-        for (pair, weight) in here.windows(2).zip(weigh.windows(2)) {
-            differ([pair[0], pair[1]], weight[0] + weight[1]);
-        }
-        let next = (row + 1) * columns;
-        for (column, (item, weight)) in here.iter().zip(weigh).enumerate().take(items.len().saturating_sub(next)) {
-            differ([*item, items[next + column]], weight + weights[next + column]);
-        }
-    }
-}
-
-/// The nearest multiple of 2⁻⁵² to a number below one.
-pub(super) fn quantised(x: f64) -> f64 {
-    (x + 1.0) - 1.0
 }
 
 impl<P: Projection> Row for P {

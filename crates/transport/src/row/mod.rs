@@ -7,6 +7,7 @@
 mod buffer;
 mod cubic_tetrahedron;
 mod face;
+mod glance;
 mod global_cube;
 mod hemicube;
 mod hemisphere;
@@ -15,6 +16,7 @@ mod matrix;
 mod method;
 mod points;
 mod single_plane;
+mod surface;
 mod view;
 
 pub use cubic_tetrahedron::CubicTetrahedron;

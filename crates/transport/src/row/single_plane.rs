@@ -9,7 +9,8 @@
 
 use super::face::Face;
 use super::hemicube::side;
-use super::look::{Look, Projection};
+use super::look::Look;
+use super::surface::Projection;
 use glam::DVec3;
 
 /// The single plane.

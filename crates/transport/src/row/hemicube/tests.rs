@@ -1,7 +1,7 @@
 //! The hemicube against its published numbers, catalogue 23 and 24.
 
 use super::*;
-use crate::row::look::Atlas;
+use crate::row::surface::Atlas;
 use crate::row::tests::{ADJACENT, OPPOSITE, box_of, point_to_rectangle};
 use crate::row::{Repair, Row, RowFactors};
 use radiosity_scene::{Enclosure, Facet};
