@@ -54,7 +54,8 @@ pub enum Repair {
     #[default]
     None,
     /// Facets that nothing hides from an eye point get their exact factor from there, by Lambert's integral over their
-    /// outline, and so do those that no cell shows but that stand in front where they should be: no aliasing is left.
+    /// outline, and so do those that no cell shows but that stand in front where they should be: no aliasing is left. What cells tell of the others stays,
+    /// so rows sum to one only within their errors.
     Analytic,
     /// That, and surfaces that spin, and eye points or cells doubled, whichever matters more, until no entry of the row is
     /// predicted to be off by more; until 32 × 32 points and 1024 cells if that does not come. Truncation stays.

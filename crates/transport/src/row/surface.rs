@@ -72,7 +72,7 @@ impl Atlas<'_> {
 
 /// An even number of at least four cells, and no more than memory allows.
 fn resolution_of(projection: &dyn Projection) -> usize {
-    projection.look().resolution.clamp(4, 4 * MOST_CELLS).next_multiple_of(2)
+    projection.look().resolution.clamp(4, 2 * MOST_CELLS).next_multiple_of(2)
 }
 
 impl Level {

@@ -135,7 +135,7 @@ fn catalogue_91_all_surfaces_agree_around_a_corner() {
 #[test]
 fn predicted_errors_cover_the_true_ones() {
     let room = room_with_block();
-    let reference = Hemisphere { rays: 1 << 17, seed: 7, ..Hemisphere::default() }.rows(&room, &()).unwrap();
+    let reference = Hemisphere { rays: 1 << 16, seed: 7, ..Hemisphere::default() }.rows(&room, &()).unwrap();
     for points in [1, 2, 4] {
         for method in RowMethod::all() {
             let found =
@@ -165,20 +165,20 @@ fn catalogue_20_intuition_holds() {
     };
     let until = |tolerance: f64| Look { resolution: 64, repair: Repair::UntilError(tolerance), ..Look::default() };
     for method in RowMethod::all().filter(|m| *m != RowMethod::SinglePlane) {
-        let row = method.with(until(2e-3)).row(0, &box_of(DVec3::ONE, 1));
-        assert!((row.factors[1].value - OPPOSITE).abs() < 2e-3, "{method}: {row:?}");
-        assert!((row.factors[4].value - ADJACENT).abs() < 2e-3, "{method}: {row:?}");
+        let row = method.with(until(4e-3)).row(0, &box_of(DVec3::ONE, 1));
+        assert!((row.factors[1].value - OPPOSITE).abs() < 4e-3, "{method}: {row:?}");
+        assert!((row.factors[4].value - ADJACENT).abs() < 4e-3, "{method}: {row:?}");
         let sum: f64 = row.factors.iter().map(|f| f.value).sum();
-        assert!((sum - 1.0).abs() < 5e-3, "{method}: {sum}");
+        assert!((sum - 1.0).abs() < 1e-2, "{method}: {sum}");
         for c in [0.5, 2.0] {
-            let row = method.with(until(2e-3)).row(0, &close(c));
-            assert!((row.factors[1].value - face_to_face(1.0, 1.0, c)).abs() < 2e-3, "{method}, {c}: {row:?}");
+            let row = method.with(until(4e-3)).row(0, &close(c));
+            assert!((row.factors[1].value - face_to_face(1.0, 1.0, c)).abs() < 4e-3, "{method}, {c}: {row:?}");
         }
         let mut unequal = Enclosure::default();
         unequal.add("large", rectangle(DVec3::ZERO, 10.0 * DVec3::X, 10.0 * DVec3::Y));
         unequal.add("small", rectangle(DVec3::new(4.5, 4.5, 5.0), DVec3::Y, DVec3::X));
-        let rows = method.with(until(1e-3)).rows(&unequal, &()).unwrap();
-        assert!((rows.row(0)[1] - rows.row(1)[0] / 100.0).abs() < 1.1e-3, "{method}: {rows:?}");
+        let rows = method.with(until(4e-3)).rows(&unequal, &()).unwrap();
+        assert!((rows.row(0)[1] - rows.row(1)[0] / 100.0).abs() < 4e-3 + 4e-5, "{method}: {rows:?}");
         assert!(rows.row(1)[0] > 0.3 && rows.row(0)[1] < 0.01, "{method}: {rows:?}");
     }
 }
