@@ -35,15 +35,9 @@ fn rows(c: &mut Criterion) {
         let mut group = c.benchmark_group(format!("row of {n}"));
         group.sample_size(10).sampling_mode(SamplingMode::Flat);
         for method in RowMethod::all() {
-            for resolution in [64, 256] {
-                let row = method.with(Look { resolution, ..Look::default() });
-                group
-                    .bench_function(format!("{method}, {resolution}"), |b| b.iter(|| black_box(row.row(n / 3, &room))));
-            }
+            let row = method.with(Look::default());
+            group.bench_function(format!("{method}, 256"), |b| b.iter(|| black_box(row.row(n / 3, &room))));
         }
-        let look = Look { repair: Repair::UntilError(1e-3), ..Look::default() };
-        let row = RowMethod::Hemicube.with(look);
-        group.bench_function("hemicube, until 1e-3", |b| b.iter(|| black_box(row.row(n / 3, &room))));
         let cube = GlobalCube::default();
         group.bench_function("global-cube, 256, directional", |b| {
             b.iter(|| black_box(cube.directional(n / 3, &room, 1)));
@@ -51,12 +45,14 @@ fn rows(c: &mut Criterion) {
         group.finish();
     }
     // All rows, with what they share made once.
-    let room = room(10);
-    let mut group = c.benchmark_group("all rows of 600");
+    let room = room(4);
+    let mut group = c.benchmark_group("all rows of 96");
     group.sample_size(10).sampling_mode(SamplingMode::Flat);
     for method in RowMethod::all() {
-        let rows = method.with(Look { resolution: 128, ..Look::default() });
-        group.bench_function(format!("{method}, 128"), |b| b.iter(|| black_box(rows.rows(&room, &()))));
+        for (name, repair) in [("plain", Repair::None), ("until 1e-3", Repair::UntilError(1e-3))] {
+            let rows = method.with(Look { resolution: 64, repair, ..Look::default() });
+            group.bench_function(format!("{method}, 64, {name}"), |b| b.iter(|| black_box(rows.rows(&room, &()))));
+        }
     }
     group.finish();
 }

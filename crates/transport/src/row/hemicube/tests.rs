@@ -45,7 +45,8 @@ fn far_square(side: f64, place: f64) -> (Enclosure, f64) {
     };
     let mut pair = Enclosure::default();
     pair.add("from", square(1e-4, [0.0; 3]));
-    let (x, y) = (0.31 + 0.011 * place, -0.17 + 0.017 * place);
+    // Steps of the golden and the plastic ratio, so that no two places lie alike on a grid.
+    let (x, y) = (0.2 + 0.3 * (0.618_034 * place).fract(), 0.3 * (0.754_878 * place).fract() - 0.4);
     pair.add("to", square(side / 2.0, [x, y, 1.0]).flipped());
     let [l, r, b, t] = [x - side / 2.0, x + side / 2.0, y - side / 2.0, y + side / 2.0];
     let corner = |x: f64, y: f64| point_to_rectangle(x, y, 1.0);
@@ -68,12 +69,12 @@ fn aliasing(side: f64, method: &dyn Row) -> (f64, usize) {
 #[test]
 fn catalogue_23_small_far_facets_alias() {
     let look = |n: usize| Look { resolution: n, ..Look::default() };
-    let errors = [32, 64, 128, 256].map(|n| aliasing(0.11, &Hemicube { look: look(n), ..Hemicube::default() }));
+    let errors = [32, 64, 128, 256].map(|n| aliasing(0.103, &Hemicube { look: look(n), ..Hemicube::default() }));
     for (error, covered) in errors {
         assert!(error > 0.0 && covered >= 38, "{errors:?}");
     }
     let slope = (errors[3].0 / errors[0].0).ln() / 8f64.ln();
-    assert!((-1.3..-0.7).contains(&slope), "{slope} of {errors:?}");
+    assert!((-1.2..-0.8).contains(&slope), "{slope} of {errors:?}");
     // Below one cell all may be lost, or several times as much be found; the prediction covers both.
     let hemicube = Hemicube { look: look(32), ..Hemicube::default() };
     let found = (0..40).map(|place| hemicube.row(0, &far_square(0.02, f64::from(place)).0).factors[1]);
@@ -87,10 +88,10 @@ fn catalogue_23_small_far_facets_alias() {
 fn catalogue_23_aliasing_is_repaired() {
     let look = Look { resolution: 64, ..Look::default() };
     let with = |look: Look| Hemicube { look, ..Hemicube::default() };
-    let plain = aliasing(0.11, &with(look)).0;
-    let turned = aliasing(0.11, &with(Look { points: 4, spin: Some(1), ..look }));
+    let plain = aliasing(0.103, &with(look)).0;
+    let turned = aliasing(0.103, &with(Look { points: 4, spin: Some(1), ..look }));
     assert!(turned.0 < plain / 3.0 && turned.1 >= 38, "{turned:?} of {plain}");
-    for side in [0.11, 0.02, 0.002] {
+    for side in [0.103, 0.02, 0.002] {
         let exact = aliasing(side, &with(Look { repair: Repair::Analytic, ..look }));
         assert!(exact.0 < 1e-3 && exact.1 >= 38, "{side}: {exact:?}");
         let (pair, factor) = far_square(side, 0.0);
