@@ -49,7 +49,7 @@ fn rows(c: &mut Criterion) {
     let mut group = c.benchmark_group("all rows of 96");
     group.sample_size(10).sampling_mode(SamplingMode::Flat);
     for method in RowMethod::all() {
-        for (name, repair) in [("plain", Repair::None), ("until 1e-3", Repair::UntilError(1e-3))] {
+        for (name, repair) in [("plain", Repair::None), ("until 1e-2", Repair::UntilError(1e-2))] {
             let rows = method.with(Look { resolution: 64, repair, ..Look::default() });
             group.bench_function(format!("{method}, 64, {name}"), |b| b.iter(|| black_box(rows.rows(&room, &()))));
         }

@@ -54,16 +54,18 @@ pub enum Repair {
     #[default]
     None,
     /// Facets that nothing hides from an eye point get their exact factor from there, by Lambert's integral over their
-    /// outline, and so do those that no cell shows but that stand in front where they should be: no aliasing is left. What cells tell of the others stays,
-    /// so rows sum to one only within their errors.
+    /// outline, and so do those that no cell shows but that stand in front where they should be: no aliasing is left. What
+    /// cells tell of the others stays, so rows sum to one only within their errors.
     Analytic,
     /// That, and surfaces that spin, and eye points or cells doubled, whichever matters more, until no entry of the row is
-    /// predicted to be off by more; until 32 × 32 points and 1024 cells if that does not come. Truncation stays.
+    /// predicted to be off by more, or a row would take more than seconds. Truncation stays.
     UntilError(f64),
 }
 
-/// Points along a side and cells beyond which [`Repair::UntilError`] gives up: a row then takes some seconds.
+/// Points along a side, and points times cells of the first face, beyond which [`Repair::UntilError`] gives up: a row then
+/// takes some seconds.
 const MOST_POINTS: usize = 32;
+const MOST_WORK: usize = 1 << 26;
 
 /// How much more of a facet that was missed other points than the eye point may see: a facet as near as that is not missed.
 const ELSEWHERE: f64 = 0.1;
@@ -120,7 +122,9 @@ impl<'a> Gaze<'a> {
             if let Repair::UntilError(tolerance) = look.repair {
                 let errors = proximity.iter().zip(&average.aliasing).map(|(p, a)| [p + a, *p, *a]);
                 let [worst, near, coarse] = errors.fold([0.0; 3], |worst, e| if e[0] > worst[0] { e } else { worst });
-                let (may_refine, may_add) = (level + 1 < self.atlas.len(), k < MOST_POINTS);
+                let work = (k * self.atlas.level(level).faces[0].cells[0]).pow(2);
+                let may_refine = level + 1 < self.atlas.len() && 4 * work <= MOST_WORK;
+                let may_add = k < MOST_POINTS && 4 * work <= MOST_WORK;
                 if worst > tolerance && (may_refine || may_add) {
                     if may_refine && (coarse > near || !may_add) {
                         level += 1
