@@ -6,6 +6,7 @@
 
 pub mod camera;
 pub mod display;
+mod element_facets;
 pub mod elements;
 pub mod facet;
 pub mod fault;
@@ -17,6 +18,7 @@ pub mod sky;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
+pub use element_facets::ElementError;
 pub use elements::{ElementId, Elements};
 pub use facet::{Enclosure, EnclosureSurface, Facet, FacetError};
 pub use fault::{Fault, Faults, Severity, counted};

@@ -7,6 +7,7 @@
 
 pub mod direct;
 pub mod exposure;
+pub mod form_factors;
 pub mod gather;
 pub mod luminaires;
 mod one_light;
@@ -20,6 +21,7 @@ pub mod view_factors;
 
 pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;
+pub use form_factors::{FormFactorMethod, FormFactorOptions, FormFactors, UnknownFormFactorMethod};
 pub use gather::Gather;
 pub use luminaires::{Light, Luminaires};
 pub use pair::{Factor, Occlusion, PAIRS, Pair, PairMethod, Unoccluded};

@@ -89,7 +89,8 @@ impl<F: FnMut(DVec3) -> [f64; 2]> Domain<F> {
         let [_, u, v] = self.frames[frame];
         let side = f64::from(size) / f64::from(1 << DEPTH);
         let area = u.cross(v).length() * side * side * if self.square { 1.0 } else { 0.5 };
-        let mut cell = Cell { frame, at, size, values: [0.0; 2], errors: [0.0; 2], changed: [0.0; 2], spread: [0.0; 2] };
+        let mut cell =
+            Cell { frame, at, size, values: [0.0; 2], errors: [0.0; 2], changed: [0.0; 2], spread: [0.0; 2] };
         for k in 0..2 {
             let rim = corners.iter().map(|c| c[k]).sum::<f64>() / corners.len() as f64;
             let (low, high) =

@@ -112,7 +112,9 @@ impl Builder<'_> {
         let corners = || self.order[start..].iter().flat_map(|i| self.from[*i].shape.corners().iter().copied());
         let [low, high] = bounds(corners());
         let hull: Vec<DVec3> = (0..8)
-            .map(|k| DVec3::from_array(std::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] })))
+            .map(|k| {
+                DVec3::from_array(std::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }))
+            })
             .collect();
         self.push(start, hull, None, Some(halves))
     }
@@ -172,7 +174,8 @@ mod tests {
         let mut parts = Vec::new();
         for i in 0..300u32 {
             let (x, y) = (f64::from(i % 10), f64::from(i / 10));
-            let p = |a: f64, b: f64| if i % 3 == 0 { DVec3::new(x + a, y + b, 0.0) } else { DVec3::new(0.0, x + a, y + b) };
+            let p =
+                |a: f64, b: f64| if i % 3 == 0 { DVec3::new(x + a, y + b, 0.0) } else { DVec3::new(0.0, x + a, y + b) };
             let facet = Facet::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)]).unwrap();
             parts.extend(Part::of(i, &if i % 2 == 0 { facet } else { facet.flipped() }));
         }

@@ -214,7 +214,12 @@ mod tests {
             kept.map(facet).collect::<Vec<_>>()
         };
         let area = |panels: &[Panel]| -> f64 {
-            panels.iter().map(|p| Facet::new(p.corners.clone()).unwrap()).inspect(|f| assert!(f.is_convex())).map(|f| f.area()).sum()
+            panels
+                .iter()
+                .map(|p| Facet::new(p.corners.clone()).unwrap())
+                .inspect(|f| assert!(f.is_convex()))
+                .map(|f| f.area())
+                .sum()
         };
         let whole = of(grid(false));
         assert_eq!(whole.len(), 1);

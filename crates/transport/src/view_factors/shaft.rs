@@ -147,7 +147,12 @@ mod tests {
     #[test]
     fn a_panel_through_a_set_is_between() {
         let (a, b) = (square(0., [0., 0.], [1., 1.]), square(2., [0., 0.], [1., 1.]));
-        let through = panel(vec![DVec3::new(0.5, 0., -1.), DVec3::new(0.5, 1., -1.), DVec3::new(0.5, 1., 1.), DVec3::new(0.5, 0., 1.)]);
+        let through = panel(vec![
+            DVec3::new(0.5, 0., -1.),
+            DVec3::new(0.5, 1., -1.),
+            DVec3::new(0.5, 1., 1.),
+            DVec3::new(0.5, 0., 1.),
+        ]);
         assert_eq!(stands(&through, &a, &b, 1e-7), Stands::Between);
     }
 }

@@ -146,8 +146,8 @@ impl ViewFactors {
         rows
     }
 
-    /// All factors by rows: starts, columns (ascending), values.
-    pub fn csr(&self) -> (Vec<usize>, Vec<u32>, Vec<f64>) {
+    /// All factors by rows: starts, columns (ascending), values, errors.
+    pub fn csr(&self) -> (Vec<usize>, Vec<u32>, Vec<f64>, Vec<f32>) {
         let n = self.len();
         let mut starts = vec![0usize; n + 1];
         for (i, j, ..) in self.entries() {
@@ -161,12 +161,14 @@ impl ViewFactors {
         }
         let mut next = starts.clone();
         let (mut columns, mut values) = (vec![0u32; starts[n]], vec![0f64; starts[n]]);
+        let mut errors = vec![0f32; starts[n]];
         // Ascending: row i first takes its mirrored columns below i, in order, as rows pass by, then its own.
-        for (i, j, value, _) in self.entries() {
+        for (i, j, value, error) in self.entries() {
             let mut put = |row: usize, column: usize| {
                 let slot = &mut next[row];
                 columns[*slot] = column as u32;
                 values[*slot] = value / self.areas[row];
+                errors[*slot] = round_up(error / self.areas[row]);
                 *slot += 1;
             };
             put(i, j);
@@ -174,7 +176,7 @@ impl ViewFactors {
                 put(j, i);
             }
         }
-        (starts, columns, values)
+        (starts, columns, values, errors)
     }
 
     /// The factors between the surfaces that facets belong to: exchange areas sum up.
@@ -189,8 +191,12 @@ impl ViewFactors {
             sum.0 += times * value;
             sum.1 += times * error;
         }
-        let mut of =
-            ViewFactors { areas: enclosure.surface_areas(), starts: vec![0], choices: self.choices, ..Default::default() };
+        let mut of = ViewFactors {
+            areas: enclosure.surface_areas(),
+            starts: vec![0],
+            choices: self.choices,
+            ..Default::default()
+        };
         for row in rows {
             for (column, (value, error)) in row {
                 of.columns.push(column);
