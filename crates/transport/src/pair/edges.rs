@@ -90,12 +90,20 @@ impl Edge {
         let (low, high) = (-along, self.length - along);
         let near = (low * low + height * height).max(f64::MIN_POSITIVE);
         let far = (high * high + height * height).max(f64::MIN_POSITIVE);
-        // high·ln far − low·ln near, by sum and difference: far − near = length·(high + low) without cancellation.
+        // high·ln far − low·ln near, by sum and difference: far − near = length·(high + low) without cancellation, and
+        // ln far − ln near = 2 artanh ((far − near)/(far + near)).
         let sum = high + low;
-        let (ratio, log) = (self.length * sum / near, near.ln());
-        let difference = if ratio.abs() < 0.5 { ratio.ln_1p() } else { far.ln() - log };
+        let x = self.length * sum / (near + far);
+        let (mean, difference) = if x.abs() < 0.125 {
+            let square = x * x;
+            let odd = |series: f64, k: i32| series * square + 1.0 / f64::from(k);
+            (0.5 * (near * far).ln(), 2.0 * x * [15, 13, 11, 9, 7, 5, 3, 1].into_iter().fold(0.0, odd))
+        } else {
+            let logs = (near.ln(), far.ln());
+            (0.5 * (logs.0 + logs.1), logs.1 - logs.0)
+        };
         let angle = (height * self.length).atan2(height * height + low * high);
-        self.length * (log + 0.5 * difference - 2.0) + 0.5 * sum * difference + 2.0 * height * angle
+        self.length * (mean - 2.0) + 0.5 * sum * difference + 2.0 * height * angle
     }
 }
 

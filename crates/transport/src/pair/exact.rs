@@ -320,6 +320,40 @@ mod tests {
         assert!(worst < 1e-12, "{worst:e}");
     }
 
+    /// Rows of tetrahedra and of slabs of any flatness sum to one: every edge is shared, at every angle.
+    #[test]
+    fn rows_of_flat_and_slender_solids_sum_to_one() {
+        let mut random = Random::new(8);
+        let mut next = || 2.0 * random.next_unit() - 1.0;
+        for k in 0..300 {
+            let flat = 10f64.powi(-(k % 10));
+            let mut point = |z: f64| DVec3::new(next(), next(), z * flat);
+            let [a, b, c] = [point(0.0), point(0.0), point(0.0)];
+            let solid: Vec<Vec<DVec3>> = if k % 2 == 0 {
+                let top = point(1.0);
+                vec![vec![a, b, c], vec![a, top, b], vec![b, top, c], vec![c, top, a]]
+            } else {
+                let up = point(1.0) * 0.3;
+                let up = DVec3::new(up.x * flat, up.y * flat, flat);
+                let [p, q, r] = [a, b, c].map(|x| x + up);
+                vec![vec![a, b, c], vec![r, q, p], vec![a, p, q, b], vec![b, q, r, c], vec![c, r, p, a]]
+            };
+            let inside = solid.iter().flatten().sum::<DVec3>() / solid.iter().flatten().count() as f64;
+            let face = |corners: &Vec<DVec3>| {
+                let face = Facet::new(corners.clone()).unwrap();
+                if face.height(inside) < 0.0 { face.flipped() } else { face }
+            };
+            let faces: Vec<Facet> = solid.iter().map(face).collect();
+            for from in &faces {
+                let row = faces.iter().map(|to| exchange(from, to));
+                let [sum, error] = row.fold([0.0; 2], |sum, [value, error]| [sum[0] + value, sum[1] + error]);
+                let off = (sum / from.area() - 1.0).abs();
+                // The narrow sides are as wide as the coordinates say, to their rounding.
+                assert!(off <= 1e-13 + 1e-15 / flat && off <= 1e-13 + error / from.area(), "{off:e} at {flat:e}");
+            }
+        }
+    }
+
     /// Near or far, small or large: the ways of integration agree where one takes over from the other, and distant
     /// factors keep twelve digits of the inverse square with its first correction.
     #[test]
