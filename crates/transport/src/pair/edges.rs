@@ -24,6 +24,9 @@ const DIGITS: f64 = 30.0;
 const APART: f64 = 1.9;
 const APART_PARALLEL: f64 = 6.0;
 
+/// Most points of the rules over both edges: thirteen cost as much as the closed form.
+const BOTH: usize = 12;
+
 /// Ratio of lengths beyond which the longer edge is divided, so that no difference cancels, and how many lengths of the
 /// shorter one are kept to either side: what is beyond them is apart.
 const SLENDER: f64 = 10.0;
@@ -145,13 +148,55 @@ pub fn log_integral(e: &Edge, f: &Edge) -> f64 {
     }
 }
 
-/// Gauss over `e` of the closed form over `f`. The points at which ln r² is singular, continued to complex places along
-/// `e`, lie on the ellipses about `e` through the points of `f`.
-fn by_gauss(e: &Edge, f: &Edge, apart: f64) -> f64 {
+/// Points that a rule needs where the distances of the edge's ends from the other edge are `apart` times its length. The
+/// points at which ln r² is singular, continued to complex places along an edge, lie on the ellipses about it through
+/// the points of the other.
+fn points(apart: f64) -> usize {
     let rho = apart + (apart * apart - 1.0).max(0.0).sqrt();
-    let n = (DIGITS / (2.0 * rho.ln())).ceil().max(2.0) as usize;
+    (DIGITS / (2.0 * rho.ln())).ceil().max(2.0) as usize
+}
+
+/// Gauss over `e` of the closed form over `f`, or over both where both are apart.
+fn by_gauss(e: &Edge, f: &Edge, apart: f64) -> f64 {
+    let n = points(apart);
+    let from_f = (e.distance(f.start) + e.distance(f.end)) / f.length;
+    if n <= BOTH && from_f > 1.5 {
+        let m = points(from_f);
+        if m <= BOTH {
+            return by_gauss_over_both(e, f, n, m);
+        }
+    }
     let sum: f64 = gauss(n).iter().map(|[x, w]| w * f.log_from(e.start + x * e.length * e.direction)).sum();
     e.length * sum
+}
+
+/// Gauss over both edges. Points that lie symmetric to the middles have the same weight and share a logarithm.
+fn by_gauss_over_both(e: &Edge, f: &Edge, n: usize, m: usize) -> f64 {
+    let (mut p, mut q) = ([DVec3::ZERO; BOTH], [DVec3::ZERO; BOTH]);
+    for (edge, places, n) in [(e, &mut p, n), (f, &mut q, m)] {
+        let along = edge.length * edge.direction;
+        for (place, [x, _]) in places.iter_mut().zip(gauss(n)) {
+            *place = edge.start + *x * along;
+        }
+    }
+    let mut sum = 0.0;
+    for (i, [_, weight_p]) in gauss(n)[..n.div_ceil(2)].iter().enumerate() {
+        for (j, [_, weight_q]) in gauss(m)[..m.div_ceil(2)].iter().enumerate() {
+            let (k, l) = (n - 1 - i, m - 1 - j);
+            let mut product = p[i].distance_squared(q[j]);
+            if l != j {
+                product *= p[i].distance_squared(q[l]);
+            }
+            if k != i {
+                product *= p[k].distance_squared(q[j]);
+                if l != j {
+                    product *= p[k].distance_squared(q[l]);
+                }
+            }
+            sum += weight_p * weight_q * product.ln();
+        }
+    }
+    e.length * f.length * sum
 }
 
 /// Gauss over pieces of `e`, halved until each is apart from `f`.
