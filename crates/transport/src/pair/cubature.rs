@@ -1,6 +1,6 @@
 //! The double-area integral by adaptive cubature (catalogue 17): F = (1/A_i) ∫ F_dA(x) dA_i, where the outer integral is
 //! adaptive and the inner one is Lambert's formula for what is seen: the whole, what shadows of polygons leave of it
-//! ([`super::shadow`]), or what segments find ([`super::segments`]) where polygons are not all there is, or are many.
+//! (`shadow.rs`), or what segments find (`segments.rs`) where polygons are not all there is, or are many.
 //!
 //! The outer rule has seventeen points, of degree 7 with one of degree 5 among them, in the unit squares that
 //! quadrilaterals of `from` are mapped to (Genz and Malik 1980, "An adaptive algorithm for numerical integration over an
