@@ -217,6 +217,7 @@ mod tests {
     use crate::pair::Unoccluded;
     use crate::pair::blockers::Blockers;
     use crate::pair::exact::exact;
+    use crate::pair::sampled::Malley;
 
     fn rectangle(origin: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Facet {
         let [o, u, v] = [origin, u, v].map(DVec3::from_array);
@@ -305,6 +306,27 @@ mod tests {
             }
         }
         assert!(partial > 8, "{partial}");
+    }
+
+    /// Triangles at random between two squares, few and many: as rays find them.
+    #[test]
+    fn catalogue_18_many_blockers_as_rays_find_them() {
+        let mut random = radiosity_trace::sampling::Random::new(6);
+        for (count, size, tolerance) in [(12, 0.6, 1e-3), (60, 0.2, 4e-3)] {
+            let mut point = || DVec3::new(random.next_unit(), random.next_unit(), random.next_unit());
+            let triangles = (0..count).filter_map(|_| {
+                let p = 0.6 * point() + 0.2;
+                Facet::new(vec![p, p + size * (point() - 0.5), p + size * (point() - 0.5)]).ok()
+            });
+            let triangles: Vec<Facet> = triangles.collect();
+            let blockers = Blockers::new(&triangles);
+            assert!(blockers.polygons(&floor(), &ceiling()).is_some_and(|polygons| polygons.len() > count / 2));
+            let factor = Cubature { tolerance, ..Cubature::default() }.factor(&floor(), &ceiling(), &blockers);
+            let rays = Malley { rays: 1 << 16, seed: 1 }.factor(&floor(), &ceiling(), &blockers);
+            let off = (factor.value - rays.value).abs();
+            assert!(off <= factor.error + rays.error, "{count}: {factor:?} {rays:?}");
+            assert!(factor.error <= tolerance && factor.value > 0.02 && factor.value < 0.19, "{factor:?}");
+        }
     }
 
     #[test]

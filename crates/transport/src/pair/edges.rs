@@ -4,8 +4,8 @@
 //! common perpendicular, of length d, and their angle θ: r² = a² + b² − 2ab cos θ + d². The divergence theorem, with
 //! x·∇ ln r² = 2 − 2d²/r², leaves integrals over one edge each and d² ∫∫ 1/r², which is elementary for edges in one plane
 //! (d = 0) and otherwise, with a sin θ = d sinh x and b sin θ = d sinh y, a sum of dilogarithms of e^{±x±y±iθ}, as
-//! Schröder and Hanrahan 1993 ("On the form factor between two polygons") found by other means. Edges far apart are
-//! integrated by Gauss, which loses fewer digits. Loses digits only for edges that are almost, not quite, parallel and
+//! Schröder and Hanrahan 1993 ("On the form factor between two polygons") found by other means. Edges apart are
+//! integrated by Gauss, which is faster and loses fewer digits. Loses digits only for edges that are almost, not quite, parallel and
 //! much nearer than they are long.
 
 use super::gauss::gauss;
@@ -153,18 +153,17 @@ pub fn log_integral(e: &Edge, f: &Edge) -> f64 {
 /// the points of the other.
 fn points(apart: f64) -> usize {
     let rho = apart + (apart * apart - 1.0).max(0.0).sqrt();
-    (DIGITS / (2.0 * rho.ln())).ceil().max(2.0) as usize
+    // Infinitely many where the edges meet.
+    (DIGITS / (2.0 * rho.ln().max(0.0))).ceil().max(2.0) as usize
 }
 
 /// Gauss over `e` of the closed form over `f`, or over both where both are apart.
 fn by_gauss(e: &Edge, f: &Edge, apart: f64) -> f64 {
     let n = points(apart);
     let from_f = (e.distance(f.start) + e.distance(f.end)) / f.length;
-    if n <= BOTH && from_f > 1.5 {
-        let m = points(from_f);
-        if m <= BOTH {
-            return by_gauss_over_both(e, f, n, m);
-        }
+    let m = points(from_f);
+    if n.max(m) <= BOTH {
+        return by_gauss_over_both(e, f, n, m);
     }
     let sum: f64 = gauss(n).iter().map(|[x, w]| w * f.log_from(e.start + x * e.length * e.direction)).sum();
     e.length * sum

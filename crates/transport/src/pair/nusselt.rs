@@ -128,6 +128,7 @@ pub fn to_sphere(point: DVec3, normal: DVec3, centre: DVec3, radius: f64) -> f64
 mod tests {
     use super::*;
     use crate::pair::lambert::lambert;
+    use crate::pair::smooth::kernel;
     use radiosity_trace::sampling::Random;
 
     /// The same as Lambert's formula for polygons at random, many of them across the horizon.
@@ -149,6 +150,22 @@ mod tests {
             seen += usize::from(truth > 0.0);
         }
         assert!(seen > 800, "{seen}");
+    }
+
+    /// The hemisphere's integral over directions is the area's over points, dω = cos θ' dA'/r².
+    #[test]
+    fn catalogue_04_directions_and_areas_agree() {
+        let corner = |x: f64, y: f64| DVec3::new(0.3 + x - 0.2 * y, 0.1 + y, 1.0 + 0.4 * x);
+        let facet = Facet::new(vec![corner(0., 0.), corner(0., 1.), corner(1., 1.), corner(1., 0.)]).unwrap();
+        let mut sum = 0.0;
+        for [x, weight_x] in gauss(20) {
+            for [y, weight_y] in gauss(20) {
+                sum +=
+                    weight_x * weight_y * facet.area() * kernel(DVec3::ZERO, DVec3::Z, corner(*x, *y), facet.normal());
+            }
+        }
+        let value = to_polygon(DVec3::ZERO, DVec3::Z, &facet);
+        assert!((sum - value).abs() < 1e-13 && value > 0.05, "{sum} {value}");
     }
 
     #[test]

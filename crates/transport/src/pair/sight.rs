@@ -17,6 +17,8 @@ const UNSEEN: f64 = 3.0;
 
 /// The factor of a pair, from what it would be with nothing between and the visible share that the method saw.
 pub fn obstructed(free: Factor, share: f64, from: &Facet, to: &Facet, occlusion: &dyn Occlusion) -> Factor {
+    // Shares cut out of polygons are rounded.
+    let share = if share > 1.0 - 1e-12 { 1.0 } else { share };
     let value = share * free.value;
     let (clear, count) = probe(from, to, occlusion);
     let most = free.value + free.error;
