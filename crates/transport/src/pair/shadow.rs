@@ -10,10 +10,32 @@ use glam::DVec3;
 /// Distance from a plane below which a corner is in it, relative to the distance from the point: rounding.
 const TOUCH: f64 = 1e-13;
 
+/// Most blockers that a polygon is cut by; pieces cost evaluations each.
+const CUTS: usize = 8;
+
 /// The form factor from the differential area at a point with unit `normal` to what it sees of convex polygons past
 /// convex blockers.
 pub fn seen(point: DVec3, normal: DVec3, polygons: &[Vec<DVec3>], blockers: &[&[DVec3]]) -> f64 {
     polygons.iter().map(|polygon| seen_of(point, normal, polygon, blockers)).sum()
+}
+
+/// Convex polygons cut along the planes of blockers that stand on them or go through them: across such lines the view
+/// jumps.
+pub fn cut_where_standing(polygons: &[Vec<DVec3>], plane: (DVec3, DVec3), blockers: &[&[DVec3]]) -> Vec<Vec<DVec3>> {
+    let (origin, normal) = plane;
+    let stands = |blocker: &&&[DVec3]| {
+        let size = blocker.iter().map(|c| c.distance(origin)).fold(0.0, f64::max);
+        let heights = || blocker.iter().map(|c| (*c - origin).dot(normal));
+        heights().any(|h| h > 1e-9 * size) && heights().any(|h| h < 1e-9 * size)
+    };
+    let mut parts = polygons.to_vec();
+    for blocker in blockers.iter().filter(stands).take(CUTS) {
+        let twice: DVec3 = blocker[1..].windows(2).map(|c| (c[0] - blocker[0]).cross(c[1] - blocker[0])).sum();
+        let Some(across) = twice.try_normalize() else { continue };
+        let halves = |part: &Vec<DVec3>| split(part, across, blocker[0].dot(across));
+        parts = parts.iter().flat_map(halves).filter(|part| part.len() > 2).collect();
+    }
+    parts
 }
 
 fn seen_of(point: DVec3, normal: DVec3, polygon: &[DVec3], blockers: &[&[DVec3]]) -> f64 {
