@@ -20,7 +20,7 @@ const INSIDE: f64 = 1e-7;
 pub fn mixed(
     shadows: &mut Shadows,
     [a, b]: [&Part; 2],
-    panels: &[&Panel],
+    panels: &mut [&Panel],
     whole: Exchange,
     tolerance: f64,
     touch: f64,
@@ -38,6 +38,7 @@ pub fn mixed(
     let normal = outer.shape.normal();
 
     let middle = from.centroid();
+    Shadows::sort(middle, normal, &target, panels, touch);
     let found = integrate(&from, tolerance, |x| {
         let x = x + INSIDE * (middle - x);
         shadows.factor(x, normal, &target, panels, touch)

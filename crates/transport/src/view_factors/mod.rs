@@ -235,7 +235,7 @@ impl Walk<'_> {
             whole
         } else {
             self.choices.clipped += 1;
-            mixed(&mut self.shadows, [a, b], &panels, whole, self.options.accuracy * least, self.touch)
+            mixed(&mut self.shadows, [a, b], &mut panels, whole, self.options.accuracy * least, self.touch)
         };
         if exchange.value > 0.0 || exchange.error > 0.0 {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));

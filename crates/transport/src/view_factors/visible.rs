@@ -8,6 +8,7 @@
 use super::panel::Panel;
 use glam::DVec3;
 use smallvec::SmallVec;
+use std::cmp::Ordering;
 
 /// A convex polygon on its way through the cuts.
 pub type Loop = SmallVec<[DVec3; 10]>;
@@ -29,61 +30,112 @@ impl Shadows {
     /// above its horizon and faces it, and to what is hidden. Panels within `touch` of x hide nothing.
     pub fn factor(&mut self, x: DVec3, normal: DVec3, target: &[DVec3], panels: &[&Panel], touch: f64) -> [f64; 2] {
         self.of.clear();
-        for panel in panels {
-            let height = panel.height(x);
-            if height.abs() <= touch {
-                continue;
-            }
-            let side = -height.signum();
-            let mut planes = Shadow::new();
-            planes.push((side * panel.normal, side * panel.offset));
-            let corners = &panel.corners;
-            let mut corner = corners[corners.len() - 1] - x;
-            for next in corners {
-                let next = *next - x;
-                let normal = side * corner.cross(next);
-                planes.push((normal, normal.dot(x)));
-                corner = next;
-            }
-            self.of.push(planes);
-        }
+        self.of.extend(panels.iter().filter_map(|panel| shadow(x, panel, touch)));
         let whole = lambert(x, normal, target);
-        let hidden = hidden(x, normal, target, &self.of);
+        let hidden = hidden(x, normal, target, whole, &self.of);
         [(whole - hidden).max(0.0), hidden]
+    }
+
+    /// Puts panels in the order of what they hide from a place, most first: what one hides whole need not be looked at
+    /// again.
+    pub fn sort(x: DVec3, normal: DVec3, target: &[DVec3], panels: &mut [&Panel], touch: f64) {
+        if panels.len() < 2 {
+            return;
+        }
+        let hides = |panel: &&Panel| match shadow(x, panel, touch).map_or(Within::None, |s| within(target, &s)) {
+            Within::None => 0.0,
+            Within::Part(part) => lambert(x, normal, &part),
+            Within::All => f64::INFINITY,
+        };
+        panels.sort_by_cached_key(|panel| std::cmp::Reverse(Total(hides(panel))));
     }
 }
 
-/// The form factor of what shadows hide of a polygon.
-fn hidden(x: DVec3, normal: DVec3, target: &[DVec3], shadows: &[Shadow]) -> f64 {
+/// A number in its total order.
+#[derive(PartialEq)]
+struct Total(f64);
+
+impl Eq for Total {}
+
+impl PartialOrd for Total {
+    fn partial_cmp(&self, other: &Total) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Total {
+    fn cmp(&self, other: &Total) -> Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+/// The shadow that a panel throws as seen from x; none if x lies in its plane.
+fn shadow(x: DVec3, panel: &Panel, touch: f64) -> Option<Shadow> {
+    let height = panel.height(x);
+    if height.abs() <= touch {
+        return None;
+    }
+    let side = -height.signum();
+    let mut planes = Shadow::new();
+    planes.push((side * panel.normal, side * panel.offset));
+    let corners = &panel.corners;
+    let mut corner = corners[corners.len() - 1] - x;
+    for next in corners {
+        let next = *next - x;
+        let normal = side * corner.cross(next);
+        planes.push((normal, normal.dot(x)));
+        corner = next;
+    }
+    Some(planes)
+}
+
+/// The form factor of what shadows hide of a polygon whose own is `whole`.
+fn hidden(x: DVec3, normal: DVec3, target: &[DVec3], whole: f64, shadows: &[Shadow]) -> f64 {
     let mut sum = 0.0;
     for (k, shadow) in shadows.iter().enumerate() {
-        if let Some(part) = within(target, shadow) {
-            sum += lambert(x, normal, &part) - hidden(x, normal, &part, &shadows[..k]);
+        match within(target, shadow) {
+            Within::None => {}
+            Within::All => return whole,
+            Within::Part(part) => {
+                let own = lambert(x, normal, &part);
+                sum += own - hidden(x, normal, &part, own, &shadows[..k]);
+            }
         }
     }
     sum
 }
 
-/// The part of a convex polygon within a shadow; `None` where there is none.
-fn within(polygon: &[DVec3], shadow: &Shadow) -> Option<Loop> {
-    let is_outside = |(normal, offset): &(DVec3, f64)| {
+/// How much of a polygon lies within a shadow.
+enum Within {
+    None,
+    Part(Loop),
+    All,
+}
+
+fn within(polygon: &[DVec3], shadow: &Shadow) -> Within {
+    let mut all = true;
+    for (normal, offset) in shadow {
         let (mut low, mut high) = (0.0f64, 0.0f64);
         for p in polygon {
             let h = normal.dot(*p) - offset;
             (low, high) = (low.min(h), high.max(h));
         }
-        high <= ROUNDING * high.max(-low)
-    };
-    if shadow.iter().any(is_outside) {
-        return None;
+        let reach = ROUNDING * high.max(-low);
+        if high <= reach {
+            return Within::None;
+        }
+        all &= low >= -reach;
+    }
+    if all {
+        return Within::All;
     }
     let mut part: Loop = polygon.iter().copied().collect();
     for &(normal, offset) in shadow {
         if !keep_above(&mut part, normal, offset) {
-            return None;
+            return Within::None;
         }
     }
-    Some(part)
+    Within::Part(part)
 }
 
 /// Cuts off what lies below a plane; whether anything is left.
