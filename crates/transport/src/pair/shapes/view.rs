@@ -1,0 +1,152 @@
+//! The differential factor F_dA→shape: Lambert's contour integral over the border of what is seen (Lambert 1760; Howell,
+//! Mengüç and Siegel 2016, ch. 4), with anything in the way.
+//!
+//! The border of what is visible is made of outlines: of the shape, of what blocks it and of the horizon. All of them are
+//! cut where they cross one another; each piece then counts +1, −1 or 0 as the shape is visible to its left, to its right,
+//! or on both sides or neither, which two rays tell. No case of who covers whom is told apart, so none can be forgotten.
+//! Fails where outlines run within [`ASIDE`] of one another: what lies between them is missed, a share of at most [`ASIDE`].
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::body::{Body, Kind};
+use super::curve::Curve;
+use super::element;
+use super::outline::Outlines;
+
+/// How far beside a curve the two rays go, radians. Rounding of silhouettes spans 1e-15; what is narrower is not seen.
+const ASIDE: f64 = 1e-9;
+
+/// Cuts closer than this are one: a curve that touches another is cut twice, apart by the root of the rounding, and the
+/// middle of the two is exact.
+const TOUCH: f64 = 2e-7;
+
+/// Places along a piece at which its sides may be looked at; the first that is clear of other curves is taken.
+const LOOKS: [f64; 5] = [0.5, 0.31, 0.73, 0.12, 0.91];
+
+/// A body as seen from places on another one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen<'a> {
+    pub(super) body: &'a Body,
+    /// Whether rays start on its surface.
+    pub(super) starts_on: bool,
+}
+
+/// What is looked at, and what may be in the way.
+#[derive(Clone, Debug)]
+pub(super) struct View<'a> {
+    pub(super) to: Seen<'a>,
+    pub(super) blockers: Vec<Seen<'a>>,
+}
+
+impl View<'_> {
+    /// The share of what an element at `eye` gives off that arrives.
+    pub(super) fn factor(&self, eye: DVec3, normal: DVec3) -> f64 {
+        if self.blockers.is_empty() && !self.to.starts_on {
+            let to = self.to.body;
+            match &to.kind {
+                Kind::Zone { radius, cos } if *cos <= -1.0 && to.sign > 0.0 => {
+                    return element::sphere(to.o - eye, normal, *radius);
+                }
+                Kind::Polygon(corners) => return element::polygon(to, corners, eye, normal),
+                _ => {}
+            }
+        }
+        self.by_outlines(eye, normal)
+    }
+
+    /// The same by outlines, whatever the shape.
+    pub(super) fn by_outlines(&self, eye: DVec3, normal: DVec3) -> f64 {
+        let mut outlines = Outlines::default();
+        outlines.curves.push(Curve::horizon(normal));
+        for seen in std::iter::once(&self.to).chain(&self.blockers) {
+            outlines.add(seen.body, eye, seen.starts_on);
+        }
+        let mut is_horizon = true;
+        outlines.curves.retain(|curve| std::mem::take(&mut is_horizon) || !curve.is_below(normal));
+        let Outlines { curves, marks } = outlines;
+
+        let (mut sum, mut cuts) = (0.0, Vec::new());
+        for (k, curve) in curves.iter().enumerate() {
+            // Cut the curve where others cross or touch it.
+            cuts.clear();
+            for (_, other) in curves.iter().enumerate().filter(|(j, _)| *j != k) {
+                curve.crossings(other, &mut cuts);
+            }
+            cuts.extend(marks.iter().filter_map(|mark| curve.parameter(*mark)));
+            arrange(&mut cuts, curve);
+            for pair in cuts.windows(2) {
+                let side = self.side(&curves, k, pair[0], pair[1], eye, normal);
+                if side != 0.0 {
+                    sum += side * curve.contour(normal, pair[0], pair[1]);
+                }
+            }
+        }
+        sum.clamp(0.0, 1.0)
+    }
+
+    /// 1 where the shape is visible to the left of a piece only, −1 to the right only, else 0.
+    fn side(&self, curves: &[Curve], k: usize, t0: f64, t1: f64, eye: DVec3, normal: DVec3) -> f64 {
+        let curve = &curves[k];
+        let mut frame = [DVec3::ZERO; 2];
+        let mut clear = false;
+        for look in LOOKS {
+            frame = curve.frame(t0 + look * (t1 - t0));
+            clear = !curves.iter().enumerate().any(|(j, other)| j != k && other.off(frame[0]) < 3.0 * ASIDE);
+            if clear {
+                break;
+            }
+        }
+        // A piece that runs along another counts once, with the first of them.
+        if !clear && curves[..k].iter().any(|other| other.off(frame[0]) < 3.0 * ASIDE) {
+            return 0.0;
+        }
+        let [d, left] = frame;
+        let sees = |d: DVec3| f64::from(u8::from(d.dot(normal) > 0.0 && self.is_seen(eye, d.normalize())));
+        sees(d + ASIDE * left) - sees(d - ASIDE * left)
+    }
+
+    /// Whether the first thing that a ray meets is the active side of the shape.
+    fn is_seen(&self, eye: DVec3, direction: DVec3) -> bool {
+        let Some(hit) = self.to.body.hit(eye, direction, self.to.starts_on) else { return false };
+        let is_before = |seen: &Seen| seen.body.hit(eye, direction, seen.starts_on).is_some_and(|b| b.t < hit.t);
+        hit.front && !self.blockers.iter().any(is_before)
+    }
+}
+
+/// Sorts cuts, takes those that mean one place together, and adds the ends of the curve.
+fn arrange(cuts: &mut Vec<f64>, curve: &Curve) {
+    cuts.sort_by(f64::total_cmp);
+    if curve.is_closed() {
+        // Those just before a full turn belong to those just after its start.
+        while let [first, .., last] = cuts[..] {
+            if last - TAU < first - TOUCH {
+                break;
+            }
+            cuts.pop();
+            cuts.insert(0, last - TAU);
+        }
+    } else {
+        cuts.retain(|t| *t > TOUCH && *t < curve.span - TOUCH);
+    }
+    let mut places = 0;
+    let mut from = 0;
+    while from < cuts.len() {
+        let mut to = from + 1;
+        while to < cuts.len() && cuts[to] - cuts[to - 1] < TOUCH {
+            to += 1;
+        }
+        cuts[places] = cuts[from..to].iter().sum::<f64>() / (to - from) as f64;
+        places += 1;
+        from = to;
+    }
+    cuts.truncate(places);
+    match cuts.first().copied() {
+        Some(first) if curve.is_closed() => cuts.push(first + TAU),
+        _ => {
+            cuts.insert(0, 0.0);
+            cuts.push(curve.span);
+        }
+    }
+}
