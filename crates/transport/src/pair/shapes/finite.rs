@@ -100,3 +100,23 @@ pub(super) fn reached(factor: Factor, tolerance: f64) -> Result<Factor, ShapeErr
         Err(ShapeError::NotReached { value: factor.value, error: factor.error })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pair::shapes::{Facing, Shape};
+    use glam::DVec3;
+
+    #[test]
+    fn dbg() {
+        let wall = Body::new(&Shape::Frustum { base: DVec3::ZERO, axis: DVec3::Z, height: 1.5, radius_base: 2.0, radius_top: 1.0, facing: Facing::Inside }).unwrap();
+        let view = view(&wall, &wall, &[]);
+        let f = |s: f64| { let p = wall.place(0, s, 0.0); view.factor(p.point, p.normal) };
+        for i in 1..200 {
+            let s = i as f64 / 200.0;
+            let e = 1e-4;
+            let d2 = f(s + e) - 2.0 * f(s) + f(s - e);
+            println!("{s} {} {d2:e}", f(s));
+        }
+    }
+}

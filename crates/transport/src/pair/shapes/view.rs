@@ -18,9 +18,12 @@ use super::outline::Outlines;
 /// How far beside a curve the two rays go, radians. Rounding of silhouettes spans 1e-15; what is narrower is not seen.
 const ASIDE: f64 = 1e-9;
 
-/// Cuts closer than this are one: a curve that touches another is cut twice, apart by the root of the rounding, and the
-/// middle of the two is exact.
-const TOUCH: f64 = 2e-7;
+/// Cuts closer than this are one where the piece between them runs within [`THIN`] of another curve: a curve that touches
+/// another is cut twice, apart by the root of the rounding, and the middle of the two is exact.
+const TOUCH: f64 = 1e-5;
+
+/// Separation of two curves, radians, that rounding may feign where they touch close to the eye.
+const THIN: f64 = 1e-11;
 
 /// Places along a piece at which its sides may be looked at; the first that is clear of other curves is taken.
 const LOOKS: [f64; 5] = [0.5, 0.31, 0.73, 0.12, 0.91];
@@ -67,16 +70,22 @@ impl View<'_> {
         outlines.curves.retain(|curve| std::mem::take(&mut is_horizon) || !curve.is_below(normal));
         let Outlines { curves, marks } = outlines;
 
-        let (mut sum, mut cuts) = (0.0, Vec::new());
+        let (mut sum, mut cuts, mut found) = (0.0, Vec::new(), Vec::new());
         for (k, curve) in curves.iter().enumerate() {
             // Cut the curve where others cross or touch it.
             cuts.clear();
             for (_, other) in curves.iter().enumerate().filter(|(j, _)| *j != k) {
-                curve.crossings(other, &mut cuts);
+                found.clear();
+                curve.crossings(other, &mut found);
+                cuts.extend(found.iter().map(|t| Cut { t: *t, exact: false }));
             }
-            cuts.extend(marks.iter().filter_map(|mark| curve.parameter(*mark)));
-            arrange(&mut cuts, curve);
-            for pair in cuts.windows(2) {
+            cuts.extend(marks.iter().filter_map(|mark| Some(Cut { t: curve.parameter(*mark)?, exact: true })));
+            let is_thin = |t: f64| {
+                let [d, _] = curve.frame(t);
+                curves.iter().enumerate().any(|(j, other)| j != k && other.off(d) < THIN)
+            };
+            arrange(&mut cuts, curve.span, is_thin);
+            for pair in cuts.windows(2).map(|pair| [pair[0].t, pair[1].t]) {
                 let side = self.side(&curves, k, pair[0], pair[1], eye, normal);
                 if side != 0.0 {
                     sum += side * curve.contour(normal, pair[0], pair[1]);
@@ -115,38 +124,46 @@ impl View<'_> {
     }
 }
 
-/// Sorts cuts, takes those that mean one place together, and adds the ends of the curve.
-fn arrange(cuts: &mut Vec<f64>, curve: &Curve) {
-    cuts.sort_by(f64::total_cmp);
-    if curve.is_closed() {
+/// A place where a curve is cut.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    t: f64,
+    /// Known as the place where curves touch, not found as a root.
+    exact: bool,
+}
+
+/// Sorts the cuts of a curve, takes those together that mean one place, and adds the ends of the curve.
+fn arrange(cuts: &mut Vec<Cut>, span: f64, is_thin: impl Fn(f64) -> bool) {
+    cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
+    let is_one = |a: f64, b: f64| b - a <= f64::EPSILON || b - a < TOUCH && is_thin(0.5 * (a + b));
+    if span < TAU {
+        cuts.retain(|cut| cut.t > 0.0 && cut.t < span && !is_one(0.0, cut.t) && !is_one(cut.t, span));
+    } else if let Some(first) = cuts.first().copied() {
         // Those just before a full turn belong to those just after its start.
-        while let [first, .., last] = cuts[..] {
-            if last - TAU < first - TOUCH {
-                break;
-            }
+        while let Some(last) = cuts.last().copied().filter(|last| cuts.len() > 1 && is_one(last.t - TAU, first.t)) {
             cuts.pop();
-            cuts.insert(0, last - TAU);
+            cuts.insert(0, Cut { t: last.t - TAU, ..last });
         }
-    } else {
-        cuts.retain(|t| *t > TOUCH && *t < curve.span - TOUCH);
     }
-    let mut places = 0;
-    let mut from = 0;
+    let (mut places, mut from) = (0, 0);
     while from < cuts.len() {
         let mut to = from + 1;
-        while to < cuts.len() && cuts[to] - cuts[to - 1] < TOUCH {
+        while to < cuts.len() && is_one(cuts[to - 1].t, cuts[to].t) {
             to += 1;
         }
-        cuts[places] = cuts[from..to].iter().sum::<f64>() / (to - from) as f64;
+        let group = &cuts[from..to];
+        let any_exact = group.iter().any(|cut| cut.exact);
+        let (sum, count) = group.iter().filter(|cut| cut.exact == any_exact).fold((0.0, 0.0), |(s, n), c| (s + c.t, n + 1.0));
+        cuts[places] = Cut { t: sum / count, exact: any_exact };
         places += 1;
         from = to;
     }
     cuts.truncate(places);
     match cuts.first().copied() {
-        Some(first) if curve.is_closed() => cuts.push(first + TAU),
+        Some(first) if span >= TAU => cuts.push(Cut { t: first.t + TAU, ..first }),
         _ => {
-            cuts.insert(0, 0.0);
-            cuts.push(curve.span);
+            cuts.insert(0, Cut { t: 0.0, exact: true });
+            cuts.push(Cut { t: span, exact: true });
         }
     }
 }
