@@ -22,10 +22,12 @@ mod closed;
 mod curve;
 mod element;
 mod finite;
+pub mod flat;
 mod gauss;
 mod hit;
 mod outline;
 mod shape;
+mod strings;
 mod view;
 
 pub use shape::{Facing, Shape, ShapeError};
