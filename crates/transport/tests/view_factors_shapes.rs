@@ -82,7 +82,8 @@ fn asked(case: &Value, shapes: &[Shape]) -> Option<(Shape, Shape, Vec<Shape>)> {
         "F23 (outer to one annulus)" => [0, 2],
         _ => return None,
     };
-    let mut blockers: Vec<Shape> = case["blockers"].as_array().into_iter().flatten().map(|b| shape(b).unwrap()).collect();
+    let mut blockers: Vec<Shape> =
+        case["blockers"].as_array().into_iter().flatten().map(|b| shape(b).unwrap()).collect();
     if quantity.contains("itself") || quantity.contains("annulus") {
         blockers.push(shapes[1].clone());
     }
@@ -93,7 +94,9 @@ fn asked(case: &Value, shapes: &[Shape]) -> Option<(Shape, Shape, Vec<Shape>)> {
 fn check(name: &str, tolerance: f64, by: impl Fn(&Shape, &Shape, &[Shape], f64) -> Factor) -> usize {
     let mut done = 0;
     for case in cases(name) {
-        let Some(shapes) = case["surfaces"].as_array().unwrap().iter().map(shape).collect::<Option<Vec<_>>>() else { continue };
+        let Some(shapes) = case["surfaces"].as_array().unwrap().iter().map(shape).collect::<Option<Vec<_>>>() else {
+            continue;
+        };
         let Some((from, to, blockers)) = asked(&case, &shapes) else { continue };
         if blockers.iter().any(|b| matches!(b, Shape::Facet(_))) {
             continue;
@@ -102,8 +105,19 @@ fn check(name: &str, tolerance: f64, by: impl Fn(&Shape, &Shape, &[Shape], f64) 
         let got = by(&from, &to, &blockers, tolerance);
         let value = case["value"].as_f64().unwrap();
         let off = got.value - value;
-        println!("{:42} {:.15} {off:9.1e} stated {:8.1e} {:?}", case["id"].as_str().unwrap(), got.value, got.error, started.elapsed());
-        if !(off.abs() <= tolerance) { println!("BAD"); } if false { assert!(true, "{}: {got:?} is {off:e} off {value}", case["id"]);}
+        println!(
+            "{:42} {:.15} {off:9.1e} stated {:8.1e} {:?}",
+            case["id"].as_str().unwrap(),
+            got.value,
+            got.error,
+            started.elapsed()
+        );
+        if !(off.abs() <= tolerance) {
+            println!("BAD");
+        }
+        if false {
+            assert!(true, "{}: {got:?} is {off:e} off {value}", case["id"]);
+        }
         done += 1;
     }
     done
@@ -128,7 +142,12 @@ fn catalogue_30_curved_blockers() {
 }
 #[test]
 fn y_tight() {
-    let t = |a: &Shape, b: &Shape, o: &[Shape], t| shapes::factor(a, b, o, t).unwrap_or_else(|e| {println!("{e}"); Factor::default()});
+    let t = |a: &Shape, b: &Shape, o: &[Shape], t| {
+        shapes::factor(a, b, o, t).unwrap_or_else(|e| {
+            println!("{e}");
+            Factor::default()
+        })
+    };
     check("view_factors.json", 1e-12, t);
     check("view_factors_occluded.json", 1e-12, t);
 }

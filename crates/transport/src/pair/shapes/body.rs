@@ -110,8 +110,7 @@ impl Body {
                 body(Kind::Element, finite("position", *position)?, direction("normal", *normal)?, 1.0, 0.0)
             }
             Shape::Facet(facet) => {
-                let mut made =
-                    body(Kind::Polygon(Vec::new()), facet.centroid(), facet.normal(), 1.0, facet.area());
+                let mut made = body(Kind::Polygon(Vec::new()), facet.centroid(), facet.normal(), 1.0, facet.area());
                 let flat = |p: DVec3| {
                     let p = p - made.o;
                     DVec2::new(p.dot(made.u), p.dot(made.v))
@@ -139,7 +138,13 @@ impl Body {
                     return Err(ShapeError::Hole { inner, radius: r });
                 }
                 let kind = Kind::Ellipse { a: r, b: r, hole: inner / r };
-                body(kind, finite("center", *center)?, direction("normal", *normal)?, 1.0, PI * (r - inner) * (r + inner))
+                body(
+                    kind,
+                    finite("center", *center)?,
+                    direction("normal", *normal)?,
+                    1.0,
+                    PI * (r - inner) * (r + inner),
+                )
             }
             Shape::Ellipse { center, normal, axis, semi_axes: [a, b] } => {
                 let (a, b) = (positive("semi-axis", *a)?, positive("semi-axis", *b)?);

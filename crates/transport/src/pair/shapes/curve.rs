@@ -17,8 +17,14 @@ const NEAR_AXIS: f64 = 0.04;
 /// Error left in the integral over an arc of an ellipse.
 const ELLIPSE_TOLERANCE: f64 = 1e-14;
 
-/// Samples among which the crossings of two cones are bracketed. They have at most four; fewer samples miss close pairs.
-const SAMPLES: usize = 24;
+/// Intervals in which the crossings of two cones are sought first; halved or doubled, the same are found.
+const INTERVALS: usize = 8;
+
+/// Where the first of them starts: nowhere near the angles of symmetry, at which roots would lie on borders.
+const START: f64 = 0.123_456_7;
+
+/// Half of the width below which an interval is not halved: f varies by less than its rounding there.
+const NARROWEST: f64 = 1e-8;
 
 /// A point counts as lying on a curve within this angle.
 pub(super) const ON: f64 = 1e-7;
@@ -153,28 +159,22 @@ impl Curve {
     /// Appends the parameters at which this curve crosses the other, or the other continued.
     pub(super) fn crossings(&self, other: &Curve, found: &mut Vec<f64>) {
         let start = found.len();
-        match &other.form {
-            Form::Great(m) => {
-                let [c, x, y] = [self.c, self.a, self.b].map(|p| p.dot(*m));
-                cosine_roots(c, x, y, found);
+        match (&self.form, &other.form) {
+            (_, Form::Great(m)) => self.in_plane(*m, found),
+            // By the parameters of the cone, which are the sharper ones; then by the directions there.
+            (Form::Great(m), _) => {
+                other.in_plane(*m, found);
+                for t in &mut found[start..] {
+                    let d = other.at(*t);
+                    *t = d.dot(self.b).atan2(d.dot(self.a));
+                }
             }
-            Form::Circle(inverse) | Form::Ellipse(inverse) => {
+            (_, Form::Circle(inverse) | Form::Ellipse(inverse)) => {
                 let [c, x, y] = [self.c, self.a, self.b].map(|p| *inverse * p);
                 let q = |p: DVec3, s: DVec3| p.x * s.x + p.y * s.y - p.z * s.z;
                 // The cone of the other at r(t), by harmonics.
                 let constant = q(c, c) + 0.5 * (q(x, x) + q(y, y));
-                let harmonics = [2.0 * q(c, x), 2.0 * q(c, y), 0.5 * (q(x, x) - q(y, y)), q(x, y)];
-                if let Form::Great(_) = self.form {
-                    // Only the second harmonic, whose roots repeat after half a turn.
-                    cosine_roots(constant, harmonics[2], harmonics[3], found);
-                    let n = found.len();
-                    for i in start..n {
-                        found[i] *= 0.5;
-                        found.push(found[i] + PI);
-                    }
-                } else {
-                    harmonic_roots(constant, harmonics, found);
-                }
+                harmonic_roots(constant, [2.0 * q(c, x), 2.0 * q(c, y), 0.5 * (q(x, x) - q(y, y)), q(x, y)], found);
             }
         }
         let mut keep = start;
@@ -186,6 +186,18 @@ impl Curve {
             }
         }
         found.truncate(keep);
+    }
+
+    /// Appends the parameters at which the curve crosses the plane through the eye with this normal. A plane that it comes
+    /// as close to as rounding allows is touched, not crossed: horizons touch the rims of what they are tangent to.
+    fn in_plane(&self, m: DVec3, found: &mut Vec<f64>) {
+        let [c, x, y] = [self.c, self.a, self.b].map(|p| p.dot(m));
+        let size = x.hypot(y);
+        let rounding = 8.0 * f64::EPSILON * (self.c.length() + self.a.length() + self.b.length());
+        if c.abs() < size - rounding {
+            let (middle, half) = (y.atan2(x), (-c / size).acos());
+            found.extend([middle - half, middle + half]);
+        }
     }
 
     /// (1/2π) ∫ (r × dr)·n / r² from t0 to t1.
@@ -219,7 +231,8 @@ impl Curve {
         if s * rho <= NEAR_AXIS * alpha {
             let quarters = ((t1 - t0) / FRAC_PI_2).ceil().max(1.0);
             let step = (t1 - t0) / quarters;
-            let quarter = |i: i32| fifteen(t0 + f64::from(i) * step, t0 + f64::from(i + 1) * step, |t| self.integrand(n, t));
+            let quarter =
+                |i: i32| fifteen(t0 + f64::from(i) * step, t0 + f64::from(i + 1) * step, |t| self.integrand(n, t));
             return (0..quarters as i32).map(quarter).sum();
         }
         let e1 = (ca * self.a + cb * self.b) / (rho * s);
@@ -244,17 +257,8 @@ impl Curve {
     }
 }
 
-/// Roots of c + x cos t + y sin t, where there are two.
-fn cosine_roots(c: f64, x: f64, y: f64, found: &mut Vec<f64>) {
-    let size = x.hypot(y);
-    let ratio = -c / size;
-    if ratio.abs() <= 1.0 {
-        let (middle, half) = (y.atan2(x), ratio.acos());
-        found.extend([middle - half, middle + half]);
-    }
-}
-
-/// Roots of constant + h₀ cos t + h₁ sin t + h₂ cos 2t + h₃ sin 2t by bracketing, double ones only where it dips below zero.
+/// Roots of constant + h₀ cos t + h₁ sin t + h₂ cos 2t + h₃ sin 2t: intervals are halved until the bound of the second
+/// derivative shows that there is no root or that f is monotone. What only touches zero is no root.
 fn harmonic_roots(constant: f64, h: [f64; 4], found: &mut Vec<f64>) {
     let both = |t: f64| {
         let (sin, cos) = t.sin_cos();
@@ -262,26 +266,27 @@ fn harmonic_roots(constant: f64, h: [f64; 4], found: &mut Vec<f64>) {
         let value = constant + h[0] * cos + h[1] * sin + h[2] * cos2 + h[3] * sin2;
         (value, h[1] * cos - h[0] * sin + 2.0 * (h[3] * cos2 - h[2] * sin2))
     };
-    let size = constant.abs() + h.iter().map(|h| h.abs()).sum::<f64>();
-    if constant.abs() > h[0].hypot(h[1]) + h[2].hypot(h[3]) || size == 0.0 {
+    let (first, second) = (h[0].hypot(h[1]), h[2].hypot(h[3]));
+    if constant.abs() > first + second {
         return;
     }
+    let bend = first + 4.0 * second;
     let value = |t: f64| both(t).0;
-    let mut from = (0.0, both(0.0));
-    for i in 1..=SAMPLES {
-        let t = TAU * i as f64 / SAMPLES as f64;
-        let to = (t, both(t));
-        let ((x, (fx, dx)), (y, (fy, dy))) = (from, to);
-        if (fx > 0.0) != (fy > 0.0) {
-            found.push(bracketed(value, x, y));
-        } else if (dx > 0.0) != (dy > 0.0) && (fx > 0.0) == (dx < 0.0) {
-            // Towards zero and back again between two samples: the turning point tells whether it went across.
-            let turn = bracketed(|t| both(t).1, x, y);
-            if (value(turn) > 0.0) != (fx > 0.0) {
-                found.extend([bracketed(value, x, turn), bracketed(value, turn, y)]);
-            }
+    let half = PI / INTERVALS as f64;
+    let mut open: Vec<(f64, f64)> = (0..INTERVALS).map(|i| (START + half * (2 * i + 1) as f64, half)).collect();
+    while let Some((middle, half)) = open.pop() {
+        let (f, slope) = both(middle);
+        if f.abs() > slope.abs() * half + 0.5 * bend * half * half {
+            continue;
         }
-        from = to;
+        if slope.abs() > bend * half {
+            let (x, y) = (middle - half, middle + half);
+            if (value(x) > 0.0) != (value(y) > 0.0) {
+                found.push(bracketed(value, x, y));
+            }
+        } else if half > NARROWEST {
+            open.extend([-0.5, 0.5].map(|side| (middle + side * half, 0.5 * half)));
+        }
     }
 }
 

@@ -69,7 +69,8 @@ impl Body {
             Kind::Plane => in_plane().map(|(hit, _)| hit),
             Kind::Polygon(corners) => in_plane().filter(|(_, at)| contains(corners, *at)).map(|(hit, _)| hit),
             Kind::Fan(corners) => {
-                let triangles = corners[1..].windows(2).filter_map(|pair| triangle_hit([corners[0], pair[0], pair[1]], p, d));
+                let triangles =
+                    corners[1..].windows(2).filter_map(|pair| triangle_hit([corners[0], pair[0], pair[1]], p, d));
                 triangles.min_by(|a, b| a.t.total_cmp(&b.t))
             }
             Kind::Ellipse { a, b, hole } => {
@@ -79,18 +80,16 @@ impl Body {
             Kind::Zone { radius, cos } => {
                 let far = p.length();
                 let c = if starts_on { 0.0 } else { (far - radius) * (far + radius) };
-                let t = roots(1.0, p.dot(d), c).into_iter().find(|t| {
-                    t.is_finite() && (*cos <= -1.0 || p.z + t * d.z >= radius * cos)
-                })?;
+                let t = roots(1.0, p.dot(d), c)
+                    .into_iter()
+                    .find(|t| t.is_finite() && (*cos <= -1.0 || p.z + t * d.z >= radius * cos))?;
                 Some(Hit { t, front: (p + t * d).dot(d) * self.sign < 0.0 })
             }
             Kind::Frustum { height, r0, r1 } => {
                 let k = (r1 - r0) / height;
                 self.cone_hit(p, d, [*r0, k], [0.0, *height], starts_on)
             }
-            Kind::Tube { radius } => {
-                self.cone_hit(p, d, [*radius, 0.0], [f64::NEG_INFINITY, f64::INFINITY], starts_on)
-            }
+            Kind::Tube { radius } => self.cone_hit(p, d, [*radius, 0.0], [f64::NEG_INFINITY, f64::INFINITY], starts_on),
         }
     }
 

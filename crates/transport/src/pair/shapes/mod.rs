@@ -17,6 +17,7 @@
 //! # Ok::<(), radiosity_transport::pair::shapes::ShapeError>(())
 //! ```
 
+mod blockers;
 mod body;
 mod closed;
 mod curve;
@@ -26,10 +27,13 @@ pub mod flat;
 mod gauss;
 mod hit;
 mod outline;
+#[cfg(test)]
+mod sample;
 mod shape;
 mod strings;
 mod view;
 
+pub use blockers::Blockers;
 pub use shape::{Facing, Shape, ShapeError};
 
 use crate::pair::Factor;

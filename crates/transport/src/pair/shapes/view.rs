@@ -20,7 +20,7 @@ const ASIDE: f64 = 1e-9;
 
 /// Cuts closer than this are one where the piece between them runs within [`THIN`] of another curve: a curve that touches
 /// another is cut twice, apart by the root of the rounding, and the middle of the two is exact.
-const TOUCH: f64 = 1e-5;
+const TOUCH: f64 = 1e-4;
 
 /// Separation of two curves, radians, that rounding may feign where they touch close to the eye.
 const THIN: f64 = 1e-11;
@@ -153,7 +153,8 @@ fn arrange(cuts: &mut Vec<Cut>, span: f64, is_thin: impl Fn(f64) -> bool) {
         }
         let group = &cuts[from..to];
         let any_exact = group.iter().any(|cut| cut.exact);
-        let (sum, count) = group.iter().filter(|cut| cut.exact == any_exact).fold((0.0, 0.0), |(s, n), c| (s + c.t, n + 1.0));
+        let (sum, count) =
+            group.iter().filter(|cut| cut.exact == any_exact).fold((0.0, 0.0), |(s, n), c| (s + c.t, n + 1.0));
         cuts[places] = Cut { t: sum / count, exact: any_exact };
         places += 1;
         from = to;
@@ -165,5 +166,55 @@ fn arrange(cuts: &mut Vec<Cut>, span: f64, is_thin: impl Fn(f64) -> bool) {
             cuts.insert(0, Cut { t: 0.0, exact: true });
             cuts.push(Cut { t: span, exact: true });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pair::shapes::body::Body;
+    use crate::pair::shapes::finite::view;
+    use crate::pair::shapes::sample::Random;
+    use crate::pair::shapes::shape::Shape;
+    use std::f64::consts::TAU;
+
+    /// Nusselt's analog taken literally: rays through even points of the unit disc below the hemisphere.
+    fn nusselt(view: &View, eye: DVec3, normal: DVec3, n: usize) -> f64 {
+        let (u, v) = normal.any_orthonormal_pair();
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let hits = (0..n).filter(|i| {
+            let (r, turn) = (((*i as f64 + 0.5) / n as f64).sqrt(), TAU * (*i as f64 * golden).fract());
+            let d = r * turn.cos() * u + r * turn.sin() * v + (1.0 - r * r).sqrt() * normal;
+            view.is_seen(eye, d)
+        });
+        hits.count() as f64 / n as f64
+    }
+
+    /// Every kind of shape behind every kind of blocker, from any element: outlines and rays agree. The lattice is off by
+    /// about the number of points that an outline of length 4 cuts, to the power ½, over n: 5e-4.
+    #[test]
+    fn catalogue_19_outlines_agree_with_the_projected_hemisphere() {
+        let mut random = Random(5);
+        let n = 40_000;
+        let mut seen = 0;
+        let mut worst = 0.0_f64;
+        for draw in 0..240 {
+            let towards = 2.4 * random.direction();
+            let normal = (towards.normalize() + random.direction()).normalize();
+            let element = Body::new(&Shape::Element { position: DVec3::ZERO, normal }).unwrap();
+            let to = Body::new(&random.shape(draw / 9, towards, 1.2, -towards)).unwrap();
+            let side = 0.3 * random.direction();
+            let blockers: Vec<Body> = (0..draw % 3)
+                .map(|i| random.shape(draw + i, 0.35 * towards + side, 0.3, towards))
+                .map(|shape| Body::new(&shape).unwrap())
+                .collect();
+            let view = view(&element, &to, &blockers);
+            let (outlines, rays) = (view.by_outlines(element.o, element.w), nusselt(&view, element.o, element.w, n));
+            assert!((view.factor(element.o, element.w) - outlines).abs() < 1e-13, "{to:?}");
+            worst = worst.max((outlines - rays).abs());
+            seen += usize::from(outlines > 0.0);
+        }
+        assert!(seen > 150, "{seen}");
+        assert!(worst < 1.5e-3, "{worst}");
     }
 }
