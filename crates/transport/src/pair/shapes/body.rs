@@ -171,7 +171,10 @@ impl Body {
             Shape::Frustum { base, axis, height, radius_base, radius_top, facing } => {
                 let (height, r0, r1) = (positive("height", *height)?, *radius_base, *radius_top);
                 positive("larger radius", r0.max(r1))?;
-                if !(r0.min(r1) >= 0.0) {
+                if !(r0.is_finite() && r1.is_finite()) {
+                    return Err(ShapeError::NotFinite("radius"));
+                }
+                if r0.min(r1) < 0.0 {
                     return Err(ShapeError::NotPositive { what: "smaller radius", value: r0.min(r1) });
                 }
                 let area = PI * (r0 + r1) * height.hypot(r1 - r0);

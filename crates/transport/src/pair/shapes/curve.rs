@@ -23,8 +23,8 @@ const INTERVALS: usize = 8;
 /// Where the first of them starts: nowhere near the angles of symmetry, at which roots would lie on borders.
 const START: f64 = 0.123_456_7;
 
-/// Half of the width below which an interval is not halved: f varies by less than its rounding there.
-const NARROWEST: f64 = 1e-8;
+/// Variation of f over an interval, relative to the terms of which it is the difference, that is rounding.
+const FLAT: f64 = 1e-15;
 
 /// A point counts as lying on a curve within this angle.
 pub(super) const ON: f64 = 1e-7;
@@ -174,7 +174,9 @@ impl Curve {
                 let q = |p: DVec3, s: DVec3| p.x * s.x + p.y * s.y - p.z * s.z;
                 // The cone of the other at r(t), by harmonics.
                 let constant = q(c, c) + 0.5 * (q(x, x) + q(y, y));
-                harmonic_roots(constant, [2.0 * q(c, x), 2.0 * q(c, y), 0.5 * (q(x, x) - q(y, y)), q(x, y)], found);
+                let harmonics = [2.0 * q(c, x), 2.0 * q(c, y), 0.5 * (q(x, x) - q(y, y)), q(x, y)];
+                let scale = c.length_squared() + x.length_squared() + y.length_squared();
+                harmonic_roots(constant, harmonics, scale, found);
             }
         }
         let mut keep = start;
@@ -258,8 +260,9 @@ impl Curve {
 }
 
 /// Roots of constant + h₀ cos t + h₁ sin t + h₂ cos 2t + h₃ sin 2t: intervals are halved until the bound of the second
-/// derivative shows that there is no root or that f is monotone. What only touches zero is no root.
-fn harmonic_roots(constant: f64, h: [f64; 4], found: &mut Vec<f64>) {
+/// derivative shows that there is no root or that f is monotone. What only touches zero is no root, nor are those of two
+/// curves that are one; `scale` is that of the terms of which f is the difference.
+fn harmonic_roots(constant: f64, h: [f64; 4], scale: f64, found: &mut Vec<f64>) {
     let both = |t: f64| {
         let (sin, cos) = t.sin_cos();
         let (sin2, cos2) = (2.0 * sin * cos, cos * cos - sin * sin);
@@ -284,7 +287,7 @@ fn harmonic_roots(constant: f64, h: [f64; 4], found: &mut Vec<f64>) {
             if (value(x) > 0.0) != (value(y) > 0.0) {
                 found.push(bracketed(value, x, y));
             }
-        } else if half > NARROWEST {
+        } else if bend * half * half > FLAT * scale {
             open.extend([-0.5, 0.5].map(|side| (middle + side * half, 0.5 * half)));
         }
     }

@@ -29,10 +29,13 @@ pub(super) fn view<'a>(from: &'a Body, to: &'a Body, blockers: &'a [Body]) -> Vi
     View { to: seen(to), blockers: all }
 }
 
+/// The integrand at a place of a chart.
+type Integrand<'a, const N: usize> = Box<dyn Fn(usize, [f64; N]) -> f64 + 'a>;
+
 /// The integral over one body, being refined.
 enum Side<'a> {
-    Line(Adaptive<1, Box<dyn Fn(usize, [f64; 1]) -> f64 + 'a>>),
-    Square(Adaptive<2, Box<dyn Fn(usize, [f64; 2]) -> f64 + 'a>>),
+    Line(Adaptive<1, Integrand<'a, 1>>),
+    Square(Adaptive<2, Integrand<'a, 2>>),
 }
 
 impl<'a> Side<'a> {

@@ -5,7 +5,7 @@
 //! directions of ends and tangents, and the outer one is cut where a line touches two of them, so that each piece is
 //! smooth. Rows of tubes and triangular ducts are Hottel's (1954; McAdams, "Heat transmission", 3rd ed.).
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec2;
 
@@ -343,6 +343,5 @@ mod tests {
         assert!(matches!(factor(&strip, &strip, &[], 0.0), Err(ShapeError::Tolerance(_))));
         assert!(tube_row(2.0, 1.0).is_err() && triangular_duct([1.0, 1.0, 3.0]).is_err());
         assert!((tube_row(1.0, 1.0).unwrap() - 1.0).abs() < 1e-15);
-        let _ = PI;
     }
 }
