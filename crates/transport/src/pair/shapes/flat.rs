@@ -1,7 +1,7 @@
 //! The same in two dimensions: strips and circular cylinders, infinitely long, by their profiles in the plane.
 //!
 //! F₁₂ = (1/A₁) ∫ ½ ∫ cos θ V dθ dx₁ with the angle θ in the plane and A the length of the profile. With nothing in the way
-//! convex profiles exchange by [crossed strings](super::strings); otherwise the inner integral is a sum of sines between the
+//! convex profiles exchange by crossed strings; otherwise the inner integral is a sum of sines between the
 //! directions of ends and tangents, and the outer one is cut where a line touches two of them, so that each piece is
 //! smooth. Rows of tubes and triangular ducts are Hottel's (1954; McAdams, "Heat transmission", 3rd ed.).
 

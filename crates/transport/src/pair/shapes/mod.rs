@@ -2,8 +2,8 @@
 //! differential elements, each of them also as a blocker (Howell, Mengüç and Siegel, "A catalog of radiation
 //! configuration factors"; catalogue 16, 19, 21, 30).
 //!
-//! [`factor`] takes a closed form where there is one ([`closed`]) and else integrates the exact differential factor
-//! ([`view`]) over one of the two shapes ([`finite`]). [`integrated`] skips the closed forms: the second of two
+//! [`factor`] takes a closed form where there is one (`closed`) and else integrates the exact differential factor
+//! (`view`) over one of the two shapes (`finite`). [`integrated`] skips the closed forms: the second of two
 //! independent methods. [`flat`] holds the two-dimensional cases. Shapes may touch; they must not cut through one
 //! another, and shapes that are far smaller than the nodes of the first rule are apart may be missed.
 //!
