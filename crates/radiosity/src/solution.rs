@@ -7,7 +7,7 @@ use crate::Error;
 use crate::division::{Optics, divided};
 use crate::monitor::{Monitor, Stages, Watch};
 use radiosity_scene::{Bands, Elements, SkyPatches};
-use radiosity_solve::{DiffuseResponse, Go, Info, Params, jacobi};
+use radiosity_solve::{DiffuseResponse, Go, Info, Params, deflated_jacobi};
 use radiosity_trace::Tracer;
 use radiosity_transport::{Columns, ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires, Shadowing};
 use rayon::prelude::*;
@@ -280,7 +280,7 @@ impl<'a> Solution<'a> {
         };
         // Rows keep their values in single precision: asking for more than they can tell would never end.
         let params = Params { tolerance: self.options.solver.tolerance.max(1e-6), ..self.options.solver };
-        self.info = jacobi(&self.table, &response, &e, &mut x, &params, |_, info| {
+        self.info = deflated_jacobi(&self.table, &response, &e, &mut x, &params, |_, info| {
             let go = monitor.step(info.steps, info.steps + 1);
             if go { Go::On } else { Go::Stop }
         })

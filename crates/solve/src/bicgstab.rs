@@ -15,7 +15,7 @@ const BREAKDOWN: f64 = 1.5e-8;
 /// applications.
 ///
 /// # Errors
-/// As [`crate::plain_jacobi`].
+/// As [`crate::jacobi`].
 pub fn bicgstab<T: Transport>(
     transport: &T,
     response: &(impl Response + ?Sized),

@@ -10,7 +10,7 @@ use crate::{Go, Info, Params, Response, SolveError, Transport};
 /// Solves B = E + R F B in place; `b` holds the start and the result. `step` sees each iterate.
 ///
 /// # Errors
-/// [`SolveError::NotApplicable`] if the response is not self-adjoint; otherwise as [`crate::jacobi`].
+/// [`SolveError::NotApplicable`] if the response is not self-adjoint; otherwise as [`crate::deflated_jacobi`].
 pub fn conjugate_gradient<T: Transport>(
     transport: &T,
     response: &(impl Response + ?Sized),

@@ -11,11 +11,11 @@ use crate::gauge::{Gauge, is_done, remainder};
 use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
 
 /// Solves B = E + R F B in place; `b` holds the start (warm or zero) and the result. `step` sees each iterate. This is
-/// the solver `deflated-jacobi` of the table; the textbook's is [`crate::plain_jacobi`].
+/// the solver `deflated-jacobi` of the table; the textbook's is [`crate::jacobi`].
 ///
 /// # Errors
 /// [`SolveError::NotConverged`] with the last iterate left in `b`; [`SolveError::Stopped`] if `step` says so.
-pub fn jacobi<T: Transport>(
+pub fn deflated_jacobi<T: Transport>(
     transport: &T,
     response: &(impl Response + ?Sized),
     e: &[f64],

@@ -14,7 +14,7 @@ use faer::{Mat, Side};
 /// LU factors with partial pivoting; `b` receives the result.
 ///
 /// # Errors
-/// [`SolveError::NotApplicable`] if the response is not diagonal; otherwise as [`crate::plain_jacobi`].
+/// [`SolveError::NotApplicable`] if the response is not diagonal; otherwise as [`crate::jacobi`].
 pub fn lu<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),
@@ -45,7 +45,7 @@ pub fn lu<T: Rows>(
 ///
 /// # Errors
 /// [`SolveError::NotApplicable`] if the response is not self-adjoint or the symmetric form not positive definite;
-/// otherwise as [`crate::plain_jacobi`].
+/// otherwise as [`crate::jacobi`].
 pub fn cholesky<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),

@@ -13,7 +13,7 @@ use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
 /// Solves B = E + R F B in place, with [`Params::restart`] directions; `b` holds the start and the result.
 ///
 /// # Errors
-/// As [`crate::plain_jacobi`].
+/// As [`crate::jacobi`].
 pub fn gmres<T: Transport>(
     transport: &T,
     response: &(impl Response + ?Sized),

@@ -18,7 +18,7 @@ use crate::{Go, Info, Params, Response, Shoot, SolveError};
 /// Progressive refinement, the greatest unshot energy first; `b` holds the start and the result.
 ///
 /// # Errors
-/// As [`crate::plain_jacobi`]; the most shots are [`Params::max_steps`] times the number of unknowns.
+/// As [`crate::jacobi`]; the most shots are [`Params::max_steps`] times the number of unknowns.
 pub fn progressive<T: Shoot>(
     transport: &T,
     response: &(impl Response + ?Sized),

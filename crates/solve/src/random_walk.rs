@@ -15,7 +15,7 @@ use crate::{Go, Info, Params, Response, Rows, SolveError};
 ///
 /// # Errors
 /// [`SolveError::NotApplicable`] if a response is not self-adjoint or not below one, or an entry of F negative;
-/// otherwise as [`crate::plain_jacobi`].
+/// otherwise as [`crate::jacobi`].
 pub fn random_walk<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),

@@ -139,8 +139,8 @@ macro_rules! table {
 
 table! {
     applied {
-        Jacobi "jacobi" plain_jacobi "Gathering simultaneously, B ← E + R F B (Cohen & Greenberg 1985)";
-        DeflatedJacobi "deflated-jacobi" jacobi "Jacobi with the energy balanced at every sweep (Nicolaides 1987)";
+        Jacobi "jacobi" jacobi "Gathering simultaneously, B ← E + R F B (Cohen & Greenberg 1985)";
+        DeflatedJacobi "deflated-jacobi" deflated_jacobi "Jacobi with the energy balanced at every sweep (Nicolaides 1987)";
         Neumann "neumann" neumann "Neumann series, a bounce a step (Kajiya 1986)";
         Cg "cg" conjugate_gradient "Conjugate gradients in the inner product weighted by A/ρ (Hestenes & Stiefel 1952)";
         Bicgstab "bicgstab" bicgstab "Stabilised biconjugate gradients, for what is not symmetric (van der Vorst 1992)";

@@ -15,7 +15,7 @@ use crate::{Go, Info, Params, Response, Rows, SolveError, Space};
 /// Gauss–Seidel iteration; `b` holds the start and the result.
 ///
 /// # Errors
-/// [`SolveError::NotApplicable`] if the response is not diagonal; otherwise as [`crate::plain_jacobi`].
+/// [`SolveError::NotApplicable`] if the response is not diagonal; otherwise as [`crate::jacobi`].
 pub fn gauss_seidel<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),
@@ -31,7 +31,7 @@ pub fn gauss_seidel<T: Rows>(
 ///
 /// # Errors
 /// [`SolveError::NotApplicable`] if the response is not diagonal or ω is not between 0 and 2; otherwise as
-/// [`crate::plain_jacobi`].
+/// [`crate::jacobi`].
 pub fn sor<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),

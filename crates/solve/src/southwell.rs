@@ -11,7 +11,7 @@ use crate::{Go, Info, Params, Response, Shoot, SolveError};
 /// Solves B = E + R F B in place; `b` holds the start and the result. `step` sees the field after each relaxation.
 ///
 /// # Errors
-/// As [`crate::plain_jacobi`].
+/// As [`crate::jacobi`].
 pub fn southwell<T: Shoot>(
     transport: &T,
     response: &(impl Response + ?Sized),

@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p radiosity-transport --example obstructed_room -- 800 3200`
 
+#![expect(clippy::print_stdout, reason = "an example shows its answer")]
+
 use glam::DVec3;
 use radiosity_scene::{Enclosure, Facet};
 use radiosity_transport::view_factors::{ViewFactorOptions, view_factors};

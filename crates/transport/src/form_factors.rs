@@ -7,7 +7,7 @@
 use crate::pair::blockers::Blockers;
 use crate::pair::{Occlusion, PAIRS, PairMethod};
 use crate::row::{Look, RowMatrix, RowMethod};
-use crate::view_factors::{Choices, Closure, ViewFactorOptions, ViewFactors, view_factors};
+use crate::view_factors::{Choices, Closure, FactorError, ViewFactorOptions, ViewFactors, view_factors};
 use crate::{Progress, Stopped};
 use radiosity_scene::{Enclosure, Facet};
 use radiosity_solve::{SolveError, SparseTransport};
@@ -131,33 +131,30 @@ pub struct FormFactors {
 }
 
 impl FormFactors {
-    /// Bytes that N facets may take while they are computed, whatever they see.
-    pub fn bytes(method: FormFactorMethod, facets: usize) -> usize {
-        // Values and errors of a full matrix twice where it is dense first; half a matrix and its copy where it is not.
-        let by_entry = match method {
-            FormFactorMethod::Adaptive => 44 / 2 + 16,
-            _ => 32,
-        };
-        facets.saturating_mul(facets).saturating_mul(by_entry)
-    }
-
     /// Computes the factors between all facets of an enclosure.
     ///
     /// # Errors
-    /// [`Stopped`] if `progress` says so.
+    /// [`FactorError::Stopped`] if `progress` says so; [`FactorError::Memory`] where `options.adaptive.memory` does not
+    /// suffice, at once for methods that fill a whole matrix.
     pub fn new(
         method: FormFactorMethod,
         enclosure: &Enclosure,
         options: &FormFactorOptions,
         progress: &impl Progress,
-    ) -> Result<FormFactors, Stopped> {
+    ) -> Result<FormFactors, FactorError> {
+        let (facets, allowed) = (enclosure.facets.len(), options.adaptive.memory);
+        // Values and errors of the whole matrix, and of what is not zero of it.
+        let dense = facets.saturating_mul(facets).saturating_mul(2 * size_of::<f64>() + size_of::<(u32, f64, f32)>());
+        if method != FormFactorMethod::Adaptive && dense > allowed {
+            return Err(FactorError::Memory { facets, allowed });
+        }
         match method {
             FormFactorMethod::Adaptive => Ok(view_factors(enclosure, &options.adaptive, progress)?.into()),
             FormFactorMethod::Row(row) => {
                 let matrix = row.with(options.look).rows(enclosure, progress)?;
                 Ok(FormFactors::from_rows(enclosure, matrix))
             }
-            FormFactorMethod::Pair(pair) => by_pairs(pair, enclosure, progress),
+            FormFactorMethod::Pair(pair) => Ok(by_pairs(pair, enclosure, progress)?),
         }
     }
 

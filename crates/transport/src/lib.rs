@@ -28,6 +28,7 @@ pub use pair::{Factor, Occlusion, PAIRS, Pair, PairMethod, Unoccluded};
 pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers};
 pub use row::{Row, RowFactors};
 pub use rows::{HitTable, IdSpace};
+pub use view_factors::FactorError;
 
 /// Tells a long computation's progress and may end it.
 pub trait Progress: Sync {

@@ -32,8 +32,15 @@ mod tests {
             columns: &[0, 2, 1],
             values: &[0.1 + 0.2, 1e-300, 0.199_824_895_7],
         };
-        let table =
-            FactorTable { names: &[], areas: &[1.0; 3], emittances: None, rows, is_closed: false, is_script_f: false };
+        let table = FactorTable {
+            names: &[],
+            areas: &[1.0; 3],
+            emittances: None,
+            rows,
+            is_closed: false,
+            is_script_f: false,
+            errors: None,
+        };
         let mut out = Vec::new();
         write_csv(&mut out, &table).unwrap();
         let text = String::from_utf8(out).unwrap();

@@ -2,7 +2,7 @@
 //!
 //! | ending | holds | numbers |
 //! |---|---|---|
-//! | `.npz` | dense: `F`; sparse: SciPy's CSR layout; with both `area`, `names`, `emittance` | 64 bits |
+//! | `.npz` | dense: `F`; sparse: SciPy's CSR layout; with both `area`, `names`, `emittance`, `error` | 64 bits, errors 32 |
 //! | `.mtx` | MatrixMarket coordinates; names, areas and emittances as comments | shortest that read back the same |
 //! | `.csv` | a line per row, no header | shortest that read back the same |
 //! | `.txt`, `.out` | areas, matrix and emittances as View3D writes them | 6 decimals |
@@ -31,6 +31,8 @@ pub struct FactorTable<'a> {
     pub emittances: Option<&'a [f64]>,
     /// The matrix.
     pub rows: FactorRows<'a>,
+    /// Bounds of the errors, in the order of the matrix's numbers, where they are known.
+    pub errors: Option<&'a [f32]>,
     /// Whether the surfaces form an enclosure, so that rows sum to one.
     pub is_closed: bool,
     /// Whether the factors are Hottel's script-F, with reflections by the emittances.
@@ -65,6 +67,10 @@ impl FactorTable<'_> {
         assert!(self.names.is_empty() || self.names.len() == n, "{} names of {n} surfaces", self.names.len());
         if let Some(emittances) = self.emittances {
             assert_eq!(emittances.len(), n, "emittances of {n} surfaces");
+        }
+        if let Some(errors) = self.errors {
+            let (FactorRows::Dense(values) | FactorRows::Sparse { values, .. }) = self.rows;
+            assert_eq!(errors.len(), values.len(), "errors of factors");
         }
         match self.rows {
             FactorRows::Dense(values) => assert_eq!(values.len(), n * n, "factors of {n} surfaces"),
@@ -175,6 +181,7 @@ mod tests {
             rows: FactorRows::Dense(&[0.0, 1.0, 0.5, 0.5]),
             is_closed: true,
             is_script_f: false,
+            errors: None,
         };
         for (name, starts_with) in [
             ("f.npz", &b"PK"[..]),
@@ -198,8 +205,15 @@ mod tests {
     #[should_panic(expected = "factors of 2 surfaces")]
     fn lengths_must_fit() {
         let rows = FactorRows::Dense(&[1.0]);
-        let table =
-            FactorTable { names: &[], areas: &[1.0; 2], emittances: None, rows, is_closed: false, is_script_f: false };
+        let table = FactorTable {
+            names: &[],
+            areas: &[1.0; 2],
+            emittances: None,
+            rows,
+            is_closed: false,
+            is_script_f: false,
+            errors: None,
+        };
         let _ = write_csv(&mut Vec::new(), &table);
     }
 }

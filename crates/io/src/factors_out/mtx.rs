@@ -60,6 +60,7 @@ mod tests {
             rows: FactorRows::Dense(&[0.0, 0.2, 0.15, 1e-9]),
             is_closed: false,
             is_script_f: false,
+            errors: None,
         };
         let rows = FactorRows::Sparse { starts: &[0, 1, 3], columns: &[1, 0, 1], values: &[0.2, 0.15, 1e-9] };
         let write = |table: &FactorTable<'_>| {

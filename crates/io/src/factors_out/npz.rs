@@ -1,7 +1,7 @@
 //! Form factors for NumPy: a ZIP of arrays in its format `.npy` 1.0 (magic, a header in Python, numbers in little endian).
 //!
 //! Dense: `F` (N × N). Sparse: `indices`, `indptr`, `format`, `shape` and `data`, as `scipy.sparse.save_npz` has them for CSR.
-//! Beside them `area`, and where they are known `names` and `emittance`. All load without pickle.
+//! Beside them `area`, and where they are known `error` (bounds of the errors, shaped as `F` or `data`), `names` and `emittance`. All load without pickle.
 
 use super::{FactorRows, FactorTable};
 use std::io::{Result, Seek, Write};
@@ -44,6 +44,12 @@ pub fn write_npz(out: &mut (impl Write + Seek), table: &FactorTable<'_>) -> Resu
             array(&mut zip, "data", "<f8", &[values.len()], 8, CompressionMethod::Deflated)?;
             numbers(&mut zip, values.iter().map(|value| value.to_le_bytes()))?;
         }
+    }
+    if let Some(errors) = table.errors {
+        let shape = [n, n];
+        let shape = if matches!(table.rows, FactorRows::Dense(_)) { &shape[..] } else { &[errors.len()] };
+        array(&mut zip, "error", "<f4", shape, 4, CompressionMethod::Deflated)?;
+        numbers(&mut zip, errors.iter().map(|error| error.to_le_bytes()))?;
     }
     array(&mut zip, "area", "<f8", &[n], 8, CompressionMethod::Deflated)?;
     numbers(&mut zip, table.areas.iter().map(|area| area.to_le_bytes()))?;
@@ -147,6 +153,7 @@ mod tests {
             rows: FactorRows::Dense(&[0.0, 0.2, 0.15, 0.85]),
             is_closed: false,
             is_script_f: false,
+            errors: None,
         };
         let dense = arrays(&table);
         assert_eq!(dense.keys().collect::<Vec<_>>(), ["F.npy", "area.npy", "emittance.npy", "names.npy"]);
@@ -173,8 +180,15 @@ mod tests {
     #[test]
     fn the_same_factors_make_the_same_file() {
         let rows = FactorRows::Dense(&[1.0]);
-        let table =
-            FactorTable { names: &[], areas: &[1.0], emittances: None, rows, is_closed: true, is_script_f: false };
+        let table = FactorTable {
+            names: &[],
+            areas: &[1.0],
+            emittances: None,
+            rows,
+            is_closed: true,
+            is_script_f: false,
+            errors: None,
+        };
         let write = || {
             let mut out = Cursor::new(Vec::new());
             write_npz(&mut out, &table).unwrap();

@@ -166,6 +166,7 @@ mod tests {
             rows: FactorRows::Dense(&factors),
             is_closed: true,
             is_script_f: false,
+            errors: None,
         };
         let mut out = Vec::new();
         write_view3d_text(&mut out, &table).unwrap();
@@ -185,8 +186,15 @@ mod tests {
     #[test]
     fn script_f_is_marked_and_unknown_emittances_are_black() {
         let rows = FactorRows::Dense(&[0.25]);
-        let table =
-            FactorTable { names: &[], areas: &[2.0], emittances: None, rows, is_closed: false, is_script_f: true };
+        let table = FactorTable {
+            names: &[],
+            areas: &[2.0],
+            emittances: None,
+            rows,
+            is_closed: false,
+            is_script_f: true,
+            errors: None,
+        };
         let mut out = Vec::new();
         write_view3d_text(&mut out, &table).unwrap();
         let back = parse_view3d_text("f", &out).unwrap();

@@ -3,7 +3,6 @@
 //! F_ij = (1/A_i) ∫_{A_i} ∫_{A_j} cos θ_i cos θ_j V/(π r²) dA_j dA_i (catalogue 0a), the share of what leaves i that
 //! arrives at j. Each method is a file and knows how far it is off.
 
-pub mod shapes;
 mod area;
 pub mod blockers;
 pub mod contour;
@@ -18,6 +17,7 @@ pub mod point;
 pub mod sampled;
 mod segments;
 mod shadow;
+pub mod shapes;
 mod sight;
 mod smooth;
 

@@ -65,55 +65,61 @@ impl ViewFactors {
         Closure::of(&self.row_sums())
     }
 
-    /// Makes rows sum to one by moving entries within their errors' reach.
+    /// Makes rows sum to one by moving uncertain entries.
     pub fn repair(&mut self) -> Repair {
         let mut repair = Repair { before: self.closure(), ..Repair::default() };
-        let original: Vec<f64> = self.entries().map(|(.., value, _)| value).collect();
+        let before = self.stored_values().0.to_vec();
+        // σ², zero where an entry is to stay: where it reached zero.
+        let mut weights: Vec<f64> = self.stored_values().1.iter().map(|e| f64::from(*e).powi(2)).collect();
         for round in 1..=ROUNDS {
             repair.rounds = round;
             let off: Vec<f64> = self.row_sums().iter().zip(self.areas()).map(|(sum, a)| a * (1.0 - sum)).collect();
-            let lambda = self.multipliers(&off);
-            let mut clipped = false;
-            for (i, j, value, error) in self.entries() {
-                clipped |= value + error * error * (lambda[i] + lambda[j]) < 0.0;
-            }
-            self.map(|i, j, value, error| (value + error * error * (lambda[i] + lambda[j])).max(0.0));
-            if !clipped {
+            let lambda = self.multipliers(&weights, &off);
+            let (mut values, mut has_stopped) = (self.stored_values().0.to_vec(), false);
+            self.each(|i, j, k| {
+                values[k] += weights[k] * (lambda[i] + lambda[j]);
+                if values[k] < 0.0 {
+                    (values[k], weights[k], has_stopped) = (0.0, 0.0, true);
+                }
+            });
+            self.set_values(values);
+            if !has_stopped {
                 break;
             }
         }
         repair.after = self.closure();
-        for ((i, j, value, error), before) in self.entries().zip(original) {
-            let change = (value - before).abs();
+        let (values, errors) = self.stored_values();
+        self.each(|i, j, k| {
+            let change = (values[k] - before[k]).abs();
             if change > 0.0 {
                 repair.largest_change = repair.largest_change.max(change / self.areas()[i].min(self.areas()[j]));
-                repair.largest_relative = repair.largest_relative.max(change / error);
+                repair.largest_relative = repair.largest_relative.max(change / f64::from(errors[k]));
             }
-        }
+        });
         repair
     }
 
-    /// λ of Σ_j σ_ij² (λ_i + λ_j) = off_i, by conjugate gradients with the diagonal as preconditioner.
-    fn multipliers(&self, off: &[f64]) -> Vec<f64> {
+    /// λ of Σ_j w_ij (λ_i + λ_j) = off_i, by conjugate gradients with the diagonal as preconditioner.
+    fn multipliers(&self, weights: &[f64], off: &[f64]) -> Vec<f64> {
         let n = self.len();
         let apply = |x: &[f64]| {
             let mut y = vec![0.0; n];
-            for (i, j, _, error) in self.entries() {
-                let weight = error * error * (x[i] + x[j]);
+            self.each(|i, j, k| {
+                let weight = weights[k] * (x[i] + x[j]);
                 y[i] += weight;
                 if i != j {
                     y[j] += weight;
                 }
-            }
+            });
             y
         };
         let mut diagonal = vec![0.0; n];
-        for (i, j, _, error) in self.entries() {
-            diagonal[i] += error * error * if i == j { 2.0 } else { 1.0 };
+        self.each(|i, j, k| {
+            diagonal[i] += weights[k] * if i == j { 2.0 } else { 1.0 };
             if i != j {
-                diagonal[j] += error * error;
+                diagonal[j] += weights[k];
             }
-        }
+        });
         let scaled = |r: &[f64]| -> Vec<f64> {
             r.iter().zip(&diagonal).map(|(r, d)| if *d > 0.0 { r / d } else { 0.0 }).collect()
         };

@@ -33,20 +33,47 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use store::Entry;
 use visible::Shadows;
 
-/// How exact the factors are to be.
+/// How exact the factors are to be, and what they may take.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFactorOptions {
     /// Bound of the error of each F_ij between facets that see each other partly.
     pub accuracy: f64,
     /// The same for those that see each other whole.
     pub clear_accuracy: f64,
+    /// Most bytes that may be taken.
+    pub memory: usize,
+}
+
+/// Why there are no factors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FactorError {
+    /// The run was stopped.
+    #[error("stopped on request")]
+    Stopped,
+    /// The memory allowed does not suffice.
+    #[error(
+        "the form factors of {facets} facets take more than the {} MB allowed (allow more, or use fewer facets)",
+        allowed >> 20
+    )]
+    Memory {
+        /// Facets.
+        facets: usize,
+        /// Bytes allowed.
+        allowed: usize,
+    },
+}
+
+impl From<Stopped> for FactorError {
+    fn from(_: Stopped) -> FactorError {
+        FactorError::Stopped
+    }
 }
 
 impl Default for ViewFactorOptions {
     /// Errors of single factors are independent, so a row of some hundred partly blocked ones sums to one within a few
     /// times 10⁻⁵.
     fn default() -> Self {
-        ViewFactorOptions { accuracy: 1e-5, clear_accuracy: 1e-9 }
+        ViewFactorOptions { accuracy: 1e-5, clear_accuracy: 1e-9, memory: 4 << 30 }
     }
 }
 
@@ -90,18 +117,21 @@ const TOUCH: f64 = 5e-7;
 /// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
 const WHOLE: f64 = 0.05;
 
+/// Bytes that a pair takes at most, while it is found and put in order.
+const BYTES: usize = 2 * size_of::<Entry>();
+
 /// Parts of a block: one task, and the pairs that share the first look at the panels.
 const BLOCK: usize = 32;
 
 /// The view factors between all facets of an enclosure.
 ///
 /// # Errors
-/// [`Stopped`] if `progress` says so.
+/// [`FactorError::Stopped`] if `progress` says so; [`FactorError::Memory`] as soon as the pairs found so far take too much.
 pub fn view_factors(
     enclosure: &Enclosure,
     options: &ViewFactorOptions,
     progress: &impl Progress,
-) -> Result<ViewFactors, Stopped> {
+) -> Result<ViewFactors, FactorError> {
     let areas: Vec<f64> = enclosure.facets.iter().map(radiosity_scene::Facet::area).collect();
     let Some([low, high]) = enclosure.bounds() else { return Ok(ViewFactors::default()) };
     let extent = high.distance(low);
@@ -111,7 +141,8 @@ pub fn view_factors(
     let parts = enclosure.facets.iter().enumerate().flat_map(|(i, facet)| Part::of(i as u32, facet)).collect();
     let clusters = Clusters::new(parts, &mut planes);
     let blocks = clusters.blocks(BLOCK);
-    let done = AtomicUsize::new(0);
+    let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let too_much = FactorError::Memory { facets: enclosure.facets.len(), allowed: options.memory };
     let work = |block: &u32| {
         let mut walk = Walk {
             clusters: &clusters,
@@ -126,8 +157,12 @@ pub fn view_factors(
             let all: Vec<u32> = (0..panels.len() as u32).collect();
             walk.visit(*block, root, &all);
         }
+        let so_far = found.fetch_add(walk.entries.len(), Ordering::Relaxed) + walk.entries.len();
+        if so_far.saturating_mul(BYTES) > options.memory {
+            return Err(too_much);
+        }
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        progress.step(done, blocks.len()).then_some((walk.entries, walk.choices)).ok_or(Stopped)
+        progress.step(done, blocks.len()).then_some((walk.entries, walk.choices)).ok_or(FactorError::Stopped)
     };
     let found: Vec<(Vec<Entry>, Choices)> = blocks.par_iter().map(work).collect::<Result<_, _>>()?;
     let mut choices = Choices::default();

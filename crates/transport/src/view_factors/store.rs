@@ -4,7 +4,6 @@ use super::Choices;
 use super::clear::Exchange;
 use crate::pair::Factor;
 use radiosity_scene::Enclosure;
-use rayon::prelude::*;
 
 /// One exchange area between two facets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,12 +125,12 @@ impl ViewFactors {
     /// Σ_j F_ij of each row.
     pub fn row_sums(&self) -> Vec<f64> {
         let mut sums = vec![0.0; self.len()];
-        for (i, j, value, _) in self.entries() {
-            sums[i] += value / self.areas[i];
+        self.each(|i, j, k| {
+            sums[i] += self.values[k] / self.areas[i];
             if i != j {
-                sums[j] += value / self.areas[j];
+                sums[j] += self.values[k] / self.areas[j];
             }
-        }
+        });
         sums
     }
 
@@ -208,19 +207,24 @@ impl ViewFactors {
         of
     }
 
-    /// Replaces every exchange area by what `change` makes of (i, j, value, error).
-    pub(super) fn map(&mut self, change: impl Fn(usize, usize, f64, f64) -> f64 + Sync) {
-        let rows: Vec<(usize, usize)> = self.starts.windows(2).map(|w| (w[0], w[1])).collect();
-        let (columns, errors) = (&self.columns, &self.errors);
-        let old = &self.values;
-        let new: Vec<f64> = rows
-            .par_iter()
-            .enumerate()
-            .flat_map_iter(|(i, &(start, end))| {
-                let change = &change;
-                (start..end).map(move |k| change(i, columns[k] as usize, old[k], f64::from(errors[k])))
-            })
-            .collect();
-        self.values = new;
+    /// Calls `f` with (i, j ≥ i, k) of every stored pair; k is its place in [`ViewFactors::stored_values`].
+    #[inline]
+    pub(super) fn each(&self, mut f: impl FnMut(usize, usize, usize)) {
+        for (i, range) in self.starts.windows(2).enumerate() {
+            for k in range[0]..range[1] {
+                f(i, self.columns[k] as usize, k);
+            }
+        }
+    }
+
+    /// Exchange areas and their errors, m², by stored pair.
+    pub(super) fn stored_values(&self) -> (&[f64], &[f32]) {
+        (&self.values, &self.errors)
+    }
+
+    /// Puts other exchange areas in place.
+    pub(super) fn set_values(&mut self, values: Vec<f64>) {
+        assert_eq!(values.len(), self.values.len());
+        self.values = values;
     }
 }

@@ -106,6 +106,7 @@ fn hidden(x: DVec3, normal: DVec3, target: &[DVec3], whole: f64, shadows: &[Shad
 }
 
 /// How much of a polygon lies within a shadow.
+#[expect(clippy::large_enum_variant, reason = "it lives for a few lines, and a box would cost as much as the cuts")]
 enum Within {
     None,
     Part(Loop),

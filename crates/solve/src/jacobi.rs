@@ -3,7 +3,7 @@
 //!
 //! The residual r = E + R F B − B is the step itself, so each sweep costs one application of F. The error loses a
 //! factor ρ_max or more in each. It fails where that is near one: 1374 sweeps to 1e-6 on a closed cube with ρ = 0.99;
-//! see [`crate::jacobi`], which deflates the constant.
+//! see [`crate::deflated_jacobi`], which deflates the constant.
 
 use crate::gauge::{Gauge, begin, is_done};
 use crate::{Go, Info, Params, Response, SolveError, Transport};
@@ -12,7 +12,7 @@ use crate::{Go, Info, Params, Response, SolveError, Transport};
 ///
 /// # Errors
 /// [`SolveError::NotConverged`] with the last iterate left in `b`; [`SolveError::Stopped`] if `step` says so.
-pub fn plain_jacobi<T: Transport>(
+pub fn jacobi<T: Transport>(
     transport: &T,
     response: &(impl Response + ?Sized),
     e: &[f64],
