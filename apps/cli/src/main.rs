@@ -2,6 +2,7 @@
 
 mod bake;
 mod check;
+mod factors;
 mod faults;
 mod figures;
 mod html;
@@ -23,7 +24,7 @@ use std::process::ExitCode;
 
 /// Diffuse global illumination and radiative exchange by the radiosity method.
 ///
-/// SCENE is a .glb, .gltf or .obj file; without one the built-in Cornell box is used. Lengths in metres, light in
+/// SCENE is a .glb, .gltf or .obj file (`factors`: or a View3D .vs3); without one the built-in Cornell box is used. Lengths in metres, light in
 /// cd/m², lm and lx. Exit code 0: done; 1: the work failed; 2: the call or the input was wrong; 130: interrupted.
 /// Files are written whole and all together at the end; a run that fails or is interrupted leaves none.
 #[derive(Parser)]
@@ -61,6 +62,8 @@ enum Verb {
     Measure(measure::Arguments),
     /// A picture from the solution.
     Render(render::Arguments),
+    /// View factors between surfaces, for heat and for study.
+    Factors(factors::Arguments),
     /// Every fault of a scene, and what is in it.
     Check(check::Arguments),
 }
@@ -119,6 +122,7 @@ fn work(cli: &Cli, progress: &progress::Progress) -> Result<(), Failure> {
         Verb::Bake(arguments) => bake::run(arguments, &cli.global, progress),
         Verb::Measure(arguments) => measure::run(arguments, &cli.global, progress),
         Verb::Render(arguments) => render::run(arguments, &cli.global, progress),
+        Verb::Factors(arguments) => factors::run(arguments, &cli.global, progress),
         Verb::Check(arguments) => check::run(arguments, &cli.global),
     }
 }
@@ -166,9 +170,10 @@ impl From<LoadError> for Failure {
 impl From<radiosity::Error> for Failure {
     fn from(error: radiosity::Error) -> Self {
         match error {
-            radiosity::Error::Empty(_) | radiosity::Error::Memory { .. } | radiosity::Error::Lightmap(_) => {
-                Failure::input(error)
-            }
+            radiosity::Error::Empty(_)
+            | radiosity::Error::Memory { .. }
+            | radiosity::Error::Factors(_)
+            | radiosity::Error::Lightmap(_) => Failure::input(error),
             other => Failure::work(other),
         }
     }

@@ -7,7 +7,7 @@
 use crate::Failure;
 use radiosity::io::Staged;
 use std::fs::{File, canonicalize, remove_file};
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -114,8 +114,17 @@ impl Outputs {
 
     /// Writes bytes beside their place.
     pub fn stage(&mut self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+        self.stage_with(path, |out| out.write_all(bytes))
+    }
+
+    /// As [`Outputs::stage`], piece by piece, for what would fill the memory.
+    pub fn stage_with(
+        &mut self,
+        path: &Path,
+        write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+    ) -> Result<(), Failure> {
         let staged = begin(path);
-        let written = staged.write(bytes);
+        let written = staged.write_with(write);
         self.staged.push(staged);
         written.map_err(|error| unwritten(path, &error))
     }

@@ -643,3 +643,52 @@ fn an_answer_that_nobody_can_read_is_a_failure_and_no_panic() {
     let run = Run::of(room.command(call.iter().chain(&COARSE)).stdout(full).stderr(Stdio::piped()).output().unwrap());
     assert_eq!((run.code, room.names()), (Some(1), vec!["a.glb".to_owned()]), "{run:?}");
 }
+
+/// Two unit squares a metre apart, a half-size one between.
+const SQUARES: &str = "T squares\nF 3\nV 1 0 0 0\nV 2 1 0 0\nV 3 1 1 0\nV 4 0 1 0\nV 5 0 0 1\nV 6 1 0 1\nV 7 1 1 1\nV 8 0 1 1\n\
+                       V 9 .25 .25 .5\nV 10 .75 .25 .5\nV 11 .75 .75 .5\nV 12 .25 .75 .5\n\
+                       S 1 1 2 3 4 0 0 .8 floor\nS 2 8 7 6 5 0 0 .4 ceiling\nO 3 9 10 11 12\nEnd of data\n";
+
+#[test]
+fn factors_are_written_by_the_ending() {
+    let room = Room::new("factors");
+    room.write("squares.vs3", SQUARES);
+    for name in ["f.csv", "f.npz", "f.mtx", "f.txt"] {
+        let run = room.run(["factors", "squares.vs3", "-o", name]);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        assert!(!room.read(name).is_empty());
+    }
+    let text = String::from_utf8(room.read("f.csv")).unwrap();
+    let rows: Vec<Vec<f64>> = text.lines().map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    assert_eq!((rows.len(), rows[0].len()), (2, 2));
+    assert!((rows[0][1] - 0.099_506_294_6).abs() < 1e-5 && rows[0][1] == rows[1][0]);
+
+    let run = room.run(["factors", "squares.vs3", "--json", "--method", "exact"]);
+    let event: Value = serde_json::from_str(run.out.lines().last().unwrap()).unwrap();
+    assert!((event["factors"][0][1].as_f64().unwrap() - 0.199_824_895_7).abs() < 1e-9, "{event}");
+    let run = room.run(["factors", "squares.vs3", "--json", "--script-f"]);
+    let event: Value = serde_json::from_str(run.out.lines().last().unwrap()).unwrap();
+    let f = rows[0][1];
+    let exact = 0.8 * f * 0.4 / (1.0 - 0.2 * 0.6 * f * f);
+    assert!((event["factors"][0][1].as_f64().unwrap() - exact).abs() < 1e-8, "{event}");
+}
+
+#[test]
+fn factors_refuse_what_makes_no_sense() {
+    let room = Room::new("factors-refused");
+    room.write("squares.vs3", SQUARES);
+    room.write("broken.vs3", "T broken\nF 3\nV 1 0 0\nS 1 1 2 3 4 0 0 .8 floor\nEnd\n");
+    let refused = |arguments: &[&str], why: &str| {
+        let run = room.run([&["factors"], arguments].concat());
+        assert!(run.code == Some(2) && run.err.contains(why), "{arguments:?}: {run:?}");
+    };
+    refused(&["broken.vs3"], "broken.vs3:3");
+    refused(&["squares.vs3", "--method", "guess"], "hemicube");
+    refused(&["squares.vs3", "-o", "f.doc"], "must end in");
+    refused(&["squares.vs3", "--close", "--method", "hemicube"], "adaptive");
+    refused(&["squares.vs3", "--by", "element"], ".vs3");
+    refused(&["--by", "element"], "--element-size");
+    refused(&["--script-f"], "emittance");
+    refused(&["--by", "element", "--element-size", "0.02", "--memory", "1M"], "allow more");
+    assert_eq!(room.names(), ["broken.vs3", "squares.vs3"]);
+}

@@ -30,6 +30,9 @@ pub enum Error {
     /// A page of a lightmap cannot be encoded.
     #[error("page of a lightmap: {0}")]
     Picture(#[from] radiosity_io::image_out::EncodeError),
+    /// Form factors do not fit into the memory allowed.
+    #[error("{0}")]
+    Factors(radiosity_transport::FactorError),
     /// The scene has nothing to compute.
     #[error("{0}")]
     Empty(&'static str),
@@ -38,5 +41,14 @@ pub enum Error {
 impl From<radiosity_transport::Stopped> for Error {
     fn from(_: radiosity_transport::Stopped) -> Self {
         Error::Stopped
+    }
+}
+
+impl From<radiosity_transport::FactorError> for Error {
+    fn from(error: radiosity_transport::FactorError) -> Self {
+        match error {
+            radiosity_transport::FactorError::Stopped => Error::Stopped,
+            memory => Error::Factors(memory),
+        }
     }
 }

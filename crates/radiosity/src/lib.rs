@@ -20,6 +20,7 @@ mod cornell;
 mod division;
 mod error;
 mod faces;
+pub mod factors;
 mod field;
 mod judge;
 mod lightmap;
@@ -35,6 +36,7 @@ pub use answer::{Answer, Indirect};
 pub use bake::{BakeOptions, Baked, bake};
 pub use cornell::cornell_box;
 pub use error::Error;
+pub use factors::{Factors, FactorsOptions, factors};
 pub use judge::WrittenRound;
 pub use lightmap::{Lightmap, TEXEL_BYTES, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};
@@ -46,8 +48,9 @@ pub use viewpoint::place_camera;
 
 pub use radiosity_io as io;
 pub use radiosity_scene::{
-    AlphaMode, Bands, Camera, Elements, Fault, Faults, Material, Mesh, Object, PointLight, PointLightKind, Projection,
-    Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef, Up, Wrap, counted, luminance,
+    AlphaMode, Bands, Camera, Elements, Enclosure, EnclosureSurface, Facet, Fault, Faults, Material, Mesh, Object,
+    PointLight, PointLightKind, Projection, Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef, Up,
+    Wrap, counted, luminance,
 };
 pub use radiosity_solve as solve;
 pub use radiosity_trace::{Found, Place, Tracer};

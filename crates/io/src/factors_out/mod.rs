@@ -18,6 +18,7 @@ pub use npz::write_npz;
 pub use view3d_text::{View3dText, parse_view3d_text, write_view3d_text};
 
 use crate::Staged;
+use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Form factors between N surfaces and what is known of these.
@@ -127,6 +128,19 @@ impl FactorFormat {
             _ => None,
         }
     }
+
+    /// Writes form factors in this form.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(self, out: &mut (impl Write + Seek), table: &FactorTable<'_>) -> std::io::Result<()> {
+        match self {
+            FactorFormat::Npz => write_npz(out, table),
+            FactorFormat::MatrixMarket => write_mtx(out, table),
+            FactorFormat::Csv => write_csv(out, table),
+            FactorFormat::View3dText => write_view3d_text(out, table),
+        }
+    }
 }
 
 /// Why form factors were not written.
@@ -156,12 +170,7 @@ pub enum FactorsError {
 pub fn write_factors(path: &Path, table: &FactorTable<'_>) -> Result<(), FactorsError> {
     let format = FactorFormat::of(path).ok_or_else(|| FactorsError::Format(path.to_owned()))?;
     let staged = Staged::new(path);
-    let written = staged.write_with(|out| match format {
-        FactorFormat::Npz => write_npz(out, table),
-        FactorFormat::MatrixMarket => write_mtx(out, table),
-        FactorFormat::Csv => write_csv(out, table),
-        FactorFormat::View3dText => write_view3d_text(out, table),
-    });
+    let written = staged.write_with(|out| format.write(out, table));
     written.and_then(|()| staged.place()).map_err(|error| FactorsError::Io { path: path.to_owned(), error })
 }
 

@@ -3,8 +3,8 @@
 //! In a closed enclosure Σ_j F_ij = 1. The repair is the least change that makes it so: Σ (ΔS_ij/σ_ij)² is least under
 //! Σ_j S_ij = A_i, where S is the symmetric exchange area and σ its error (van Leersum 1989, "A method for determining a
 //! consistent set of radiation view factors", with errors for weights). Its solution is ΔS_ij = σ_ij² (λ_i + λ_j); the
-//! multipliers λ come from a symmetric system, by conjugate gradients. Entries stay at or above zero. What is certain
-//! does not move, so a gap in the enclosure does not close: the defect that is left is reported.
+//! multipliers λ come from a symmetric system, by conjugate gradients. Entries stay at or above zero and within twice their
+//! stated errors. What is certain does not move, so a gap in the enclosure does not close: the defect that is left is reported.
 
 use super::ViewFactors;
 use serde::Serialize;
@@ -49,14 +49,18 @@ pub struct Repair {
     pub after: Closure,
     /// Largest change of a factor.
     pub largest_change: f64,
-    /// Largest change relative to the entry's stated error: above one, the enclosure is not closed, or an error was
-    /// stated too small.
+    /// Largest change relative to the entry's stated error: where it is as large as is allowed, two, the enclosure is not
+    /// closed, or errors were stated too small.
     pub largest_relative: f64,
     /// Rounds that the bound at zero took.
     pub rounds: usize,
 }
 
-/// Rounds after which entries at zero are left there.
+/// How far an entry may be moved, in its stated errors: those are on the safe side. What lies beyond is no error but a
+/// gap in the enclosure.
+const REACH: f64 = 2.0;
+
+/// Rounds after which rows are left as they are.
 const ROUNDS: usize = 20;
 
 impl ViewFactors {
@@ -69,17 +73,21 @@ impl ViewFactors {
     pub fn repair(&mut self) -> Repair {
         let mut repair = Repair { before: self.closure(), ..Repair::default() };
         let before = self.stored_values().0.to_vec();
-        // σ², zero where an entry is to stay: where it reached zero.
+        // σ², zero where an entry is to stay: where it reached the end of its range.
         let mut weights: Vec<f64> = self.stored_values().1.iter().map(|e| f64::from(*e).powi(2)).collect();
         for round in 1..=ROUNDS {
             repair.rounds = round;
             let off: Vec<f64> = self.row_sums().iter().zip(self.areas()).map(|(sum, a)| a * (1.0 - sum)).collect();
             let lambda = self.multipliers(&weights, &off);
             let (mut values, mut has_stopped) = (self.stored_values().0.to_vec(), false);
+            let errors = self.stored_values().1;
             self.each(|i, j, k| {
-                values[k] += weights[k] * (lambda[i] + lambda[j]);
-                if values[k] < 0.0 {
-                    (values[k], weights[k], has_stopped) = (0.0, 0.0, true);
+                let reach = REACH * f64::from(errors[k]);
+                let (low, high) = ((before[k] - reach).max(0.0), before[k] + reach);
+                let wanted = values[k] + weights[k] * (lambda[i] + lambda[j]);
+                values[k] = wanted.clamp(low, high);
+                if weights[k] > 0.0 && values[k] != wanted {
+                    (weights[k], has_stopped) = (0.0, true);
                 }
             });
             self.set_values(values);
