@@ -315,10 +315,17 @@ fn summary(input: &Input, found: &Factors, arguments: &Arguments) -> Vec<String>
         }
     }
     if let Some(repair) = &found.repair {
-        lines.push(format!(
-            "closed: off by at most {:.1e} now; factors moved by at most {:.1e}, {:.1} times their stated error",
-            repair.after.largest, repair.largest_change, repair.largest_relative
-        ));
+        let moved = format!(
+            "factors moved by at most {:.1e}, {:.1} times their stated error",
+            repair.largest_change, repair.largest_relative
+        );
+        lines.push(match repair.open_rows {
+            0 => format!("closed: rows are off by at most {:.1e} now; {moved}", repair.after.largest),
+            open => format!(
+                "closed where it can be: {} more than the errors of factors explain, so the enclosure is open there; {moved}",
+                counted(open, "row lacks", "rows lack")
+            ),
+        });
     }
     lines
 }

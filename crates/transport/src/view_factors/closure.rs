@@ -52,13 +52,18 @@ pub struct Repair {
     /// Largest change relative to the entry's stated error: where it is as large as is allowed, two, the enclosure is not
     /// closed, or errors were stated too small.
     pub largest_relative: f64,
-    /// Rounds that the bound at zero took.
+    /// Rows that lack more than their errors allow, where the enclosure has a gap; they stay as they are.
+    pub open_rows: usize,
+    /// Rounds that the bounds of entries took.
     pub rounds: usize,
 }
 
 /// How far an entry may be moved, in its stated errors: those are on the safe side. What lies beyond is no error but a
 /// gap in the enclosure.
 const REACH: f64 = 2.0;
+
+/// Steps of conjugate gradients in a round; rows of a room are closed to rounding after some thirty.
+const STEPS: usize = 300;
 
 /// Rounds after which rows are left as they are.
 const ROUNDS: usize = 20;
@@ -75,10 +80,19 @@ impl ViewFactors {
         let before = self.stored_values().0.to_vec();
         // σ², zero where an entry is to stay: where it reached the end of its range.
         let mut weights: Vec<f64> = self.stored_values().1.iter().map(|e| f64::from(*e).powi(2)).collect();
+        let is_open = self.open_rows();
+        repair.open_rows = is_open.iter().filter(|open| **open).count();
+        self.each(|i, j, k| {
+            if is_open[i] && is_open[j] {
+                weights[k] = 0.0;
+            }
+        });
         for round in 1..=ROUNDS {
             repair.rounds = round;
-            let off: Vec<f64> = self.row_sums().iter().zip(self.areas()).map(|(sum, a)| a * (1.0 - sum)).collect();
-            let lambda = self.multipliers(&weights, &off);
+            let sums = self.row_sums();
+            let lacks = sums.iter().zip(self.areas()).zip(&is_open);
+            let off: Vec<f64> = lacks.map(|((sum, a), open)| if *open { 0.0 } else { a * (1.0 - sum) }).collect();
+            let lambda = self.multipliers(&weights, &off, &is_open);
             let (mut values, mut has_stopped) = (self.stored_values().0.to_vec(), false);
             let errors = self.stored_values().1;
             self.each(|i, j, k| {
@@ -107,8 +121,22 @@ impl ViewFactors {
         repair
     }
 
-    /// λ of Σ_j w_ij (λ_i + λ_j) = off_i, by conjugate gradients with the diagonal as preconditioner.
-    fn multipliers(&self, weights: &[f64], off: &[f64]) -> Vec<f64> {
+    /// Rows that lack more than all their entries may be moved: the enclosure has a gap there.
+    fn open_rows(&self) -> Vec<bool> {
+        let mut reach = vec![0.0; self.len()];
+        let errors = self.stored_values().1;
+        self.each(|i, j, k| {
+            reach[i] += REACH * f64::from(errors[k]);
+            if i != j {
+                reach[j] += REACH * f64::from(errors[k]);
+            }
+        });
+        let lacks = self.row_sums().into_iter().zip(self.areas()).map(|(sum, a)| a * (1.0 - sum).abs());
+        lacks.zip(reach).map(|(lacks, reach)| lacks > reach).collect()
+    }
+
+    /// λ of Σ_j w_ij (λ_i + λ_j) = off_i, zero on open rows, by conjugate gradients with the diagonal as preconditioner.
+    fn multipliers(&self, weights: &[f64], off: &[f64], is_open: &[bool]) -> Vec<f64> {
         let n = self.len();
         let apply = |x: &[f64]| {
             let mut y = vec![0.0; n];
@@ -129,7 +157,8 @@ impl ViewFactors {
             }
         });
         let scaled = |r: &[f64]| -> Vec<f64> {
-            r.iter().zip(&diagonal).map(|(r, d)| if *d > 0.0 { r / d } else { 0.0 }).collect()
+            let scaled = |((r, d), open): ((&f64, &f64), &bool)| if *d > 0.0 && !open { r / d } else { 0.0 };
+            r.iter().zip(&diagonal).zip(is_open).map(scaled).collect()
         };
         let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
         let mut lambda = vec![0.0; n];
@@ -139,7 +168,7 @@ impl ViewFactors {
         let mut p = z.clone();
         let mut rz = dot(&r, &z);
         let target = 1e-24 * rz;
-        for _ in 0..(4 * n).clamp(100, 10_000) {
+        for _ in 0..STEPS {
             if rz <= target || rz == 0.0 {
                 break;
             }

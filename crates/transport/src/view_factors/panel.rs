@@ -60,6 +60,9 @@ pub struct Planes {
     extent: f64,
 }
 
+/// Distance from a line below which corners lie on it, relative to that from a plane.
+const STRAIGHT: f64 = 0.01;
+
 /// Width of a cell of rounded coefficients, relative. Far above the tolerance, so that hardly a plane lies near a
 /// border; far below the differences between planes of a scene.
 const CELL: f64 = 1e-3;
@@ -149,13 +152,31 @@ pub fn panels(enclosure: &Enclosure, planes: &mut Planes) -> Vec<Panel> {
             panels.push(Panel::new(facet.corners().to_vec(), facet.normal()));
             continue;
         }
-        panels.extend(united(facets, normal).into_iter().map(|corners| Panel::new(corners, normal)));
+        panels.extend(
+            united(facets, normal, STRAIGHT * planes.touch).into_iter().map(|corners| Panel::new(corners, normal)),
+        );
     }
     panels
 }
 
+/// Drops corners that lie on the line between their neighbours, where facets met along a straight edge: rounding would make
+/// them corners of ever more pieces.
+fn straighten(contour: &mut Vec<[f64; 2]>, touch: f64) {
+    let mut k = 0;
+    while contour.len() > 3 && k < contour.len() {
+        let n = contour.len();
+        let [a, b, c] = [contour[(k + n - 1) % n], contour[k], contour[(k + 1) % n]].map(DVec2::from);
+        let off = (c - a).perp_dot(b - a).abs();
+        if off <= touch * (c - a).length() && (b - a).dot(c - b) > 0.0 {
+            contour.remove(k);
+        } else {
+            k += 1;
+        }
+    }
+}
+
 /// Convex polygons that cover what the facets of one plane cover, counter-clockwise about `normal`.
-fn united(facets: &[&Facet], normal: DVec3) -> Vec<Vec<DVec3>> {
+fn united(facets: &[&Facet], normal: DVec3, touch: f64) -> Vec<Vec<DVec3>> {
     let origin = facets[0].corners()[0];
     let (x, y) = normal.any_orthonormal_pair();
     let flat = |p: DVec3| [x.dot(p - origin), y.dot(p - origin)];
@@ -169,7 +190,10 @@ fn united(facets: &[&Facet], normal: DVec3) -> Vec<Vec<DVec3>> {
             contour
         })
         .collect();
-    let union = contours.simplify_shape_as::<i64>(FillRule::NonZero);
+    let mut union = contours.simplify_shape_as::<i64>(FillRule::NonZero);
+    for contour in union.iter_mut().flatten() {
+        straighten(contour, touch);
+    }
     let pieces = union.triangulate_as::<i64>().into_delaunay().to_convex_polygons();
     let back = |p: [f64; 2]| origin + p[0] * x + p[1] * y;
     pieces
@@ -228,6 +252,30 @@ mod tests {
         let holed = of(grid(true));
         assert!(holed.len() <= 4, "{}", holed.len());
         assert!((area(&holed) - 94.0 * 0.37 * 0.21).abs() < 1e-9);
+    }
+
+    /// Triangles whose edges meet along slanting lines: rounding adds no pieces.
+    #[test]
+    fn a_wall_of_triangles_is_one_panel() {
+        let at = |s: f64, t: f64| DVec3::new(0.265 + s * 0.158, 0.33 * t, 0.296 - 0.049 * s);
+        let mut facets = Vec::new();
+        for (a, b, c) in [([0., 0.], [0., 1.], [1., 1.]), ([0., 0.], [1., 1.], [1., 0.])] {
+            let point = |i: i32, j: i32| {
+                let (u, v) = (f64::from(i) / 8.0, f64::from(j) / 8.0);
+                let mix = |k: usize| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]);
+                at(mix(0), mix(1))
+            };
+            for i in 0..8 {
+                for j in 0..8 - i {
+                    facets.push(Facet::new(vec![point(i, j), point(i + 1, j), point(i, j + 1)]).unwrap());
+                    if i + j < 7 {
+                        facets.push(Facet::new(vec![point(i + 1, j + 1), point(i, j + 1), point(i + 1, j)]).unwrap());
+                    }
+                }
+            }
+        }
+        let panels = of(facets);
+        assert_eq!((panels.len(), panels[0].corners.len()), (1, 4), "{panels:?}");
     }
 
     #[test]

@@ -34,6 +34,10 @@ pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64) -> Stands
     let flat = |points: &[DVec3]| -> SmallVec<[DVec2; 8]> { points.iter().map(|p| panel.flat(*p)).collect() };
     let (from, to) = (flat(from), flat(to));
     let mut crossings: SmallVec<[DVec2; 64]> = SmallVec::new();
+    // Corners in the plane are met there, and a crossing next to one may get lost in rounding.
+    for (points, heights) in [(&from, &a), (&to, &b)] {
+        crossings.extend(points.iter().zip(heights).filter(|(_, h)| h.abs() <= touch).map(|(p, _)| *p));
+    }
     let mut cross = |p: DVec2, hp: f64, q: DVec2, hq: f64| {
         if (hp > 0.0) != (hq > 0.0) {
             crossings.push(p + hp / (hp - hq) * (q - p));
@@ -141,6 +145,17 @@ mod tests {
         assert_eq!(stands(&aside, &a, &b, 1e-7), Stands::Between);
         let aside = panel(vec![p(0.95, -0.2), p(1.2, 0.05), p(1.5, -0.5)]);
         assert_eq!(stands(&aside, &a, &b, 1e-7), Stands::Aside);
+    }
+
+    /// A set that touches the plane in a corner is met there too: a triangle that hides what is near that corner is no
+    /// triangle aside.
+    #[test]
+    fn a_corner_in_the_plane_counts() {
+        let p = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let from = [p(0.24, 0.04125, 0.272), p(0.24, 0.0825, 0.272), p(0.2005, 0.0825, 0.26025)];
+        let to = [p(0.27725, 0.0, 0.336), p(0.31675, 0.0, 0.3235), p(0.265, 0.0, 0.296)];
+        let foot = panel(vec![p(0.265, 0.0, 0.296), p(0.423, 0.0, 0.247), p(0.423, 0.12375, 0.247)]);
+        assert_eq!(stands(&foot, &from, &to, 5e-7), Stands::Between);
     }
 
     /// Where a panel cuts a set itself, nothing is proven but that it may matter.
