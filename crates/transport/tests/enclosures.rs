@@ -188,6 +188,38 @@ fn the_repair_moves_what_is_uncertain() {
     }
 }
 
+/// Floor under a turned block that stands on it, up to the corner of the block, sees nothing of what is outside: walls of
+/// triangles, as a mesh has them, hide it together.
+#[test]
+fn floor_under_a_block_is_hidden() {
+    let corners = [[0.265, 0.296], [0.423, 0.247], [0.472, 0.406], [0.314, 0.456]];
+    let mut scene = Enclosure::default();
+    scene.add("covered", facet(&[[0.27725, 0., 0.336], [0.31675, 0., 0.3235], [0.265, 0., 0.296]]));
+    scene.add("outside", facet(&[[0.24, 0.04125, 0.272], [0.24, 0.0825, 0.272], [0.2005, 0.0825, 0.26025]]));
+    let n = 8;
+    for k in 0..4 {
+        let ([ax, az], [bx, bz]) = (corners[k], corners[(k + 1) % 4]);
+        for turned in [false, true] {
+            let point = |i: i32, j: i32| {
+                let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+                let (s, t) = if turned { (u + v, v) } else { (u, u + v) };
+                [ax + s * (bx - ax), 0.33 * t, az + s * (bz - az)]
+            };
+            for i in 0..n {
+                for j in 0..n - i {
+                    scene.obstructions.push(facet(&[point(i, j), point(i + 1, j), point(i, j + 1)]));
+                    if i + j + 1 < n {
+                        let last = [point(i + 1, j + 1), point(i, j + 1), point(i + 1, j)];
+                        scene.obstructions.push(facet(&last));
+                    }
+                }
+            }
+        }
+    }
+    let factor = solve(&scene, 1e-5).factor(0, 1);
+    assert!(factor.value <= factor.error && factor.error <= 1e-5, "{factor:?}");
+}
+
 /// Where a wall is missing, what is known stays and the gap is told.
 #[test]
 fn the_repair_does_not_close_a_gap() {
