@@ -4,7 +4,8 @@ use crate::progress::Progress;
 use crate::{Failure, Global, faults, numbers};
 use clap::Args;
 use radiosity::io::{Document, LoadOptions};
-use radiosity::transport::HitTable;
+use radiosity::solve::Solver;
+use radiosity::transport::{FormFactorMethod, HitTable};
 use radiosity::{Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up};
 use std::f64::consts::SQRT_2;
 use std::path::{Path, PathBuf};
@@ -55,6 +56,10 @@ impl SceneArguments {
     }
 }
 
+/// A method for form factors; none for rays.
+#[derive(Clone, Copy, Debug)]
+pub struct FormFactors(pub Option<FormFactorMethod>);
+
 /// How to solve.
 #[derive(Args, Clone, Debug)]
 pub struct SolveArguments {
@@ -67,6 +72,16 @@ pub struct SolveArguments {
     /// Memory for the table of hit ids, e.g. 4G or 500M, also written 4GiB or 500MB; powers of 1024.
     #[arg(long, default_value = "4G", value_name = "BYTES", allow_hyphen_values = true, value_parser = numbers::bytes)]
     pub memory: usize,
+    /// How light between elements is found: rays, the default, or one of adaptive, hemicube, hemicube-midpoint, single-plane,
+    /// cubic-tetrahedron, global-cube, hemisphere, point, disc, lambert, nusselt, contour, exact, cubature, malley,
+    /// area-samples, global-lines. These fill a matrix that grows with the square of the elements, two thousand if no
+    /// --element-size is given. Light of lamps and sky is found the same way in either case.
+    #[arg(long = "ff", value_name = "NAME", default_value = "rays", hide_default_value = true, value_parser = numbers::form_factors)]
+    pub form_factors: FormFactors,
+    /// Solver: deflated-jacobi, the default, or one of jacobi, neumann, cg, bicgstab, gmres, gauss-seidel, sor, southwell,
+    /// progressive, shooting-cyclic, shooting-ambient, overshooting, lu, cholesky, random-walk, stochastic-jacobi.
+    #[arg(long, value_name = "NAME", default_value_t = Solver::DeflatedJacobi, hide_default_value = true)]
+    pub solver: Solver,
     /// Most rounds of refinement.
     #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true)]
     pub rounds: usize,
@@ -79,7 +94,13 @@ impl SolveArguments {
     /// As the library takes them.
     pub fn options(&self) -> radiosity::SolveOptions {
         let default = radiosity::SolveOptions::default();
-        radiosity::SolveOptions { element_size: self.element_size, memory: self.memory, ..default }
+        radiosity::SolveOptions {
+            element_size: self.element_size,
+            memory: self.memory,
+            form_factors: self.form_factors.0,
+            solver: self.solver,
+            ..default
+        }
     }
 
     /// Refuses elements that the memory would not hold if they were as small as asked. Triangles are cut into some thousand

@@ -173,6 +173,7 @@ impl From<radiosity::Error> for Failure {
             radiosity::Error::Empty(_)
             | radiosity::Error::Memory { .. }
             | radiosity::Error::Factors(_)
+            | radiosity::Error::Element(_)
             | radiosity::Error::Lightmap(_) => Failure::input(error),
             other => Failure::work(other),
         }

@@ -1,5 +1,6 @@
 //! Numbers as people write them on a command line, and as they read them.
 
+use crate::input::FormFactors;
 use radiosity::Up;
 
 /// A number to some decimals; what rounds to zero has no sign.
@@ -81,6 +82,14 @@ pub fn bytes(text: &str) -> Result<usize, String> {
     let (number, scale) = scaled.ok_or_else(wrong)?;
     let value = positive(number.trim_end()).map_err(|_| wrong())? * scale as f64;
     if (1.0..=1e15).contains(&value) { Ok(value as usize) } else { Err(wrong()) }
+}
+
+/// A method for form factors, or rays.
+pub fn form_factors(text: &str) -> Result<FormFactors, String> {
+    if text == "rays" {
+        return Ok(FormFactors(None));
+    }
+    text.parse().map(|method| FormFactors(Some(method))).map_err(|error| format!("{error}, or rays"))
 }
 
 /// Size of a picture, WIDTHxHEIGHT.

@@ -692,3 +692,34 @@ fn factors_refuse_what_makes_no_sense() {
     refused(&["--by", "element", "--element-size", "0.02", "--memory", "1M"], "allow more");
     assert_eq!(room.names(), ["broken.vs3", "squares.vs3"]);
 }
+
+/// Classic methods and solvers by their names give the light that rays give.
+#[test]
+fn classic_methods_and_solvers_by_name() {
+    let room = Room::new("classic");
+    room.write("points.csv", "x,y,z,nx,ny,nz\n0.28,0,0.02,0,1,0\n0.1,0,0.5,0,1,0\n0.28,0.5487,0.1,0,-1,0\n");
+    let measure = |further: &[&str]| -> Vec<f64> {
+        let call = ["measure", "--points", "points.csv", "--error", "20%", "--element-size", "0.1", "--json"];
+        let run = room.run([&call, further].concat());
+        assert_eq!(run.code, Some(0), "{further:?}: {run:?}");
+        let event: Value = serde_json::from_str(run.out.lines().last().unwrap()).unwrap();
+        event["irradiance"].as_array().unwrap().iter().map(|e| e[1].as_f64().unwrap()).collect()
+    };
+    let expected = measure(&[]);
+    for further in [
+        ["--ff", "adaptive", "--solver", "cg"],
+        ["--ff", "hemicube", "--solver", "progressive"],
+        ["--ff", "single-plane", "--solver", "lu"],
+        ["--ff", "rays", "--solver", "gauss-seidel"],
+    ] {
+        for (found, expected) in measure(&further).into_iter().zip(&expected) {
+            assert!((found / expected - 1.0).abs() < 0.1, "{further:?}: {found} for {expected}");
+        }
+    }
+    let refused = |further: [&str; 2], why: &str| {
+        let run = room.run([&["measure", "--points", "points.csv"], &further[..]].concat());
+        assert!(run.code == Some(2) && run.err.contains(why), "{run:?}");
+    };
+    refused(["--ff", "guess"], "cubic-tetrahedron");
+    refused(["--solver", "guess"], "gauss-seidel");
+}

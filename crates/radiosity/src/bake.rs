@@ -83,6 +83,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let stages = Stages::default();
     let mut solve = options.solve;
     solve.cells = solve.cells.max(CELLS);
+    solve.suit_method();
     solve.rays = solve.rays.max(rays_for(options.error, 512.0, FEWEST_RAYS, 2048));
     solve.fit(tracer);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };

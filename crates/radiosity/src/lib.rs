@@ -18,6 +18,7 @@ pub mod bake;
 mod canvas;
 mod cornell;
 mod division;
+mod equation;
 mod error;
 mod faces;
 pub mod factors;

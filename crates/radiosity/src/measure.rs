@@ -132,6 +132,7 @@ pub fn measure(
     solve.rays = solve.rays.max(rays_for(options.error, 32.0, 16, 1024));
     solve.cells = solve.cells.max(LOOKED_UP_CELLS);
     solve.variation = solve.variation.min(options.error);
+    solve.suit_method();
     solve.fit(tracer);
     let mut gather = rays_for(options.error, 4096.0, 32, 16384);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 1024.0, 64, 8192) as u32 };

@@ -5,11 +5,14 @@
 
 use crate::Error;
 use crate::division::{Optics, divided};
+use crate::equation::{self, Matrix};
 use crate::monitor::{Monitor, Stages, Watch};
 use radiosity_scene::{Bands, Elements, SkyPatches};
-use radiosity_solve::{DiffuseResponse, Go, Info, Params, deflated_jacobi};
+use radiosity_solve::{DiffuseResponse, Info, Params, Solver};
 use radiosity_trace::Tracer;
-use radiosity_transport::{Columns, ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires, Shadowing};
+use radiosity_transport::{
+    Columns, ElementReceivers, Exposure, FormFactorMethod, Gather, HitTable, IdSpace, Luminaires, Shadowing,
+};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -28,8 +31,14 @@ pub struct SolveOptions {
     pub rays: usize,
     /// Shadow rays per cell. Their noise averages out over the elements that a receiver sees.
     pub shadowing: Shadowing,
-    /// When the solver stops.
-    pub solver: Params,
+    /// How light between elements is found: by the table of hit ids where there is none, else by one of the methods for
+    /// form factors, whose matrix grows with the square of the elements. Light of lamps and sky is found the same way in
+    /// either case.
+    pub form_factors: Option<FormFactorMethod>,
+    /// The solver.
+    pub solver: Solver,
+    /// When it stops.
+    pub params: Params,
     /// Largest size of the table of hit ids, bytes.
     pub memory: usize,
 }
@@ -42,7 +51,9 @@ impl Default for SolveOptions {
             variation: 0.05,
             rays: 64,
             shadowing: Shadowing { places: 8, rays: 2 },
-            solver: Params { tolerance: 1e-4, ..Params::default() },
+            form_factors: None,
+            solver: Solver::DeflatedJacobi,
+            params: Params { tolerance: 1e-4, ..Params::default() },
             memory: 4 << 30,
         }
     }
@@ -51,7 +62,17 @@ impl Default for SolveOptions {
 /// Rays per cell below which an answer is of no use.
 const LEAST_RAYS: usize = 32;
 
+/// Most cells where form factors fill a matrix, unless an element size is asked for: four million pairs.
+const MATRIX_CELLS: usize = 2000;
+
 impl SolveOptions {
+    /// Fewer cells, and none of them divided, where the matrix grows with the square of the elements.
+    pub(crate) fn suit_method(&mut self) {
+        if self.form_factors.is_some() {
+            (self.cells, self.variation) = (self.cells.min(MATRIX_CELLS), f64::INFINITY);
+        }
+    }
+
     /// Fewer rays where the memory does not hold those that are asked for: an error that is missed tells more than none.
     pub(crate) fn fit(&mut self, tracer: &Tracer) {
         while self.rays > LEAST_RAYS && Solution::memory(tracer, self) > self.memory {
@@ -104,6 +125,8 @@ pub struct Solution<'a> {
     pub element_size: f64,
     sky: SkyPatches,
     table: HitTable,
+    /// What other methods than rays found of F between elements.
+    matrix: Option<Matrix>,
     options: SolveOptions,
     /// X by id: reflected and not directly carried radiosity of elements, then the sky's, then nothing.
     values: Vec<[f32; 4]>,
@@ -133,6 +156,9 @@ impl<'a> Solution<'a> {
         if mesh.triangles.is_empty() {
             return Err(Error::Empty("the scene has no surface"));
         }
+        let mut options = *options;
+        options.suit_method();
+        let options = &options;
         let stages = Stages::default();
         let element_size = element_size(tracer, options);
         let needed = Solution::memory(tracer, options);
@@ -177,6 +203,7 @@ impl<'a> Solution<'a> {
             element_size,
             sky,
             table,
+            matrix: None,
             options: *options,
             values,
             irradiance: vec![[0.0; 3]; n],
@@ -250,6 +277,12 @@ impl<'a> Solution<'a> {
         let scene_sky = &self.tracer.scene.sky;
         let sky = if scene_sky.is_black() { Vec::new() } else { self.sky.radiosity(scene_sky) };
         self.stages.time(monitor, "rays", || table.extend(self.tracer, (&ids, &sky), &receivers, rays, &watch))?;
+        if let (Some(method), None) = (self.options.form_factors, &self.matrix) {
+            let matrix = self.stages.time(monitor, "form factors", || {
+                Matrix::new(method, mesh, &self.elements, self.options.memory, &watch)
+            })?;
+            self.matrix = Some(matrix);
+        }
         let started = std::time::Instant::now();
         monitor.stage("solve");
         self.solve(monitor)?;
@@ -272,35 +305,44 @@ impl<'a> Solution<'a> {
             }
         }
         let reflectance = self.reflectance.iter().flatten().map(|r| f64::from(*r)).collect();
-        let response = DiffuseResponse { reflectance, bands: 3, reciprocal_area: None };
+        let reciprocal = self.matrix.as_ref().is_some_and(|matrix| matrix.is_reciprocal);
+        let response =
+            DiffuseResponse { reflectance, bands: 3, reciprocal_area: reciprocal.then(|| self.area.clone()) };
         let mut x: Vec<f64> = if self.info.steps > 0 {
             self.values[..n].iter().flat_map(|v| v[..3].iter().map(|v| f64::from(*v))).collect()
         } else {
             e.clone()
         };
-        // Rows keep their values in single precision: asking for more than they can tell would never end.
-        let params = Params { tolerance: self.options.solver.tolerance.max(1e-6), ..self.options.solver };
-        self.info = deflated_jacobi(&self.table, &response, &e, &mut x, &params, |_, info| {
-            let go = monitor.step(info.steps, info.steps + 1);
-            if go { Go::On } else { Go::Stop }
-        })
-        .map_err(|error| match error {
-            radiosity_solve::SolveError::Stopped => Error::Stopped,
-            other => Error::Solve(other),
-        })?;
+        self.info = equation::solve(
+            (&self.table, self.matrix.as_ref()),
+            &response,
+            (&e, &mut x),
+            (self.options.solver, &self.options.params),
+            monitor,
+        )?;
 
         for (value, x) in self.values.iter_mut().zip(x.chunks_exact(3)) {
             *value = [x[0] as f32, x[1] as f32, x[2] as f32, 0.0];
         }
-        let gathered = self.table.rows_mean(&self.of_elements());
+        let gathered = self.gathered_halves();
+        let mean = |[a, b]: [[f32; 4]; 2], band: usize| 0.5 * (a[band] + b[band]);
         for i in 0..n {
             for band in 0..3 {
                 // Within its tolerance the solver may end a little below nothing.
-                self.indirect[i][band] = (daylight[i][band] + gathered[i][band]).max(0.0);
+                self.indirect[i][band] = (daylight[i][band] + mean(gathered[i], band)).max(0.0);
                 self.irradiance[i][band] = direct[i][band] + self.indirect[i][band];
             }
         }
         Ok(())
+    }
+
+    /// F X among the elements, as two halves whose difference tells the noise of rays; a matrix has none.
+    fn gathered_halves(&self) -> Vec<[[f32; 4]; 2]> {
+        let values = self.of_elements();
+        match &self.matrix {
+            None => self.table.halves(&values),
+            Some(matrix) => matrix.gather(&values[..self.elements.len()]).into_iter().map(|h| [h, h]).collect(),
+        }
     }
 
     /// X by id, the sky's set to nothing.
@@ -336,7 +378,7 @@ impl<'a> Solution<'a> {
         let both = |(daylight, of_elements): (&[Bands; 2], [[f32; 4]; 2])| {
             std::array::from_fn(|k| std::array::from_fn(|band| (daylight[k][band] + of_elements[k][band]).max(0.0)))
         };
-        self.table.daylight().iter().zip(self.table.halves(&self.of_elements())).map(both).collect()
+        self.table.daylight().iter().zip(self.gathered_halves()).map(both).collect()
     }
 
     /// Radiosity B = E + ρ H of each element, lm/m² per band.
@@ -367,8 +409,16 @@ impl<'a> Solution<'a> {
         self.area.iter().enumerate().map(|(e, area)| area * self.exposure.share(e as u32)).collect()
     }
 
-    /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it.
+    /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it; with a
+    /// matrix, of its rows from what the table says that elements take up.
     pub fn raw_closure(&self) -> f64 {
+        if let Some(matrix) = &self.matrix {
+            let mut of_elements = vec![[1f32; 4]; self.values.len()];
+            of_elements[self.elements.len()..].fill([0.0; 4]);
+            let (found, seen) =
+                (matrix.gather(&of_elements[..self.elements.len()]), self.table.rows_mean(&of_elements));
+            return found.iter().zip(&seen).fold(0f64, |worst, (a, b)| worst.max(f64::from((a[0] - b[0]).abs())));
+        }
         let ones = vec![[1f32; 4]; self.values.len()];
         self.table.rows_mean(&ones).iter().fold(0f64, |worst, sum| worst.max((f64::from(sum[0]) - 1.0).abs()))
     }

@@ -14,7 +14,7 @@ use crate::receivers::Site;
 use crate::{Progress, Receivers, Stopped};
 use glam::DVec3;
 use radiosity_scene::{Bands, Elements, SkyPatches};
-use radiosity_solve::{AreaSpace, Transport};
+use radiosity_solve::{AreaSpace, SolveError, SparseTransport, Transport};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Found, Tracer};
 use rayon::prelude::*;
@@ -330,6 +330,33 @@ impl HitTable {
             }
         }
         sums
+    }
+
+    /// The rows among elements as a stored matrix, for solvers that need more than to apply it.
+    ///
+    /// # Errors
+    /// [`SolveError`] if an area is no finite number.
+    pub fn matrix(&self) -> Result<SparseTransport<f64>, SolveError> {
+        let n = self.space.area.len();
+        let rows: Vec<Vec<(u32, f64)>> = (0..n)
+            .into_par_iter()
+            .map(|i| {
+                let mut ids: Vec<u32> = self.row_ids(i).filter(|id| (*id as usize) < n).collect();
+                ids.sort_unstable();
+                let share = 1.0 / f64::from(self.traced[i].max(1));
+                ids.chunk_by(|a, b| a == b).map(|same| (same[0], share * same.len() as f64)).collect()
+            })
+            .collect();
+        let mut starts = vec![0];
+        let (mut columns, mut values) = (Vec::new(), Vec::new());
+        for row in rows {
+            for (column, value) in row {
+                columns.push(column);
+                values.push(value);
+            }
+            starts.push(columns.len());
+        }
+        SparseTransport::new(self.space.area.clone(), starts, columns, values)
     }
 
     /// The ids of a row, all of the same weight.
