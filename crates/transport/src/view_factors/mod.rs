@@ -13,6 +13,7 @@ mod mixed;
 mod panel;
 mod part;
 mod shaft;
+mod solid;
 mod store;
 mod visible;
 
@@ -29,6 +30,7 @@ use radiosity_scene::Enclosure;
 use rayon::prelude::*;
 use serde::Serialize;
 use shaft::{Stands, stands};
+use solid::find_solids;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use store::Entry;
 use visible::Shadows;
@@ -137,7 +139,8 @@ pub fn view_factors(
     let extent = high.distance(low);
     let touch = TOUCH * extent;
     let mut planes = Planes::new(extent, touch);
-    let panels = panels(enclosure, &mut planes);
+    let mut panels = panels(enclosure, &mut planes);
+    let solids = find_solids(&mut panels, touch);
     let parts = enclosure.facets.iter().enumerate().flat_map(|(i, facet)| Part::of(i as u32, facet)).collect();
     let clusters = Clusters::new(parts, &mut planes);
     let blocks = clusters.blocks(BLOCK);
@@ -147,6 +150,7 @@ pub fn view_factors(
         let mut walk = Walk {
             clusters: &clusters,
             panels: &panels,
+            solids: &solids,
             options,
             touch,
             shadows: Shadows::default(),
@@ -174,6 +178,7 @@ pub fn view_factors(
 struct Walk<'a> {
     clusters: &'a Clusters,
     panels: &'a [Panel],
+    solids: &'a [Vec<u32>],
     options: &'a ViewFactorOptions,
     touch: f64,
     shadows: Shadows,
@@ -270,7 +275,8 @@ impl Walk<'_> {
             whole
         } else {
             self.choices.clipped += 1;
-            mixed(&mut self.shadows, [a, b], &mut panels, whole, self.options.accuracy * least, self.touch)
+            let scene = (self.panels, self.solids);
+            mixed(&mut self.shadows, [a, b], (&mut panels, scene), whole, self.options.accuracy * least, self.touch)
         };
         if exchange.value > 0.0 || exchange.error > 0.0 {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));

@@ -24,6 +24,8 @@ pub struct Panel {
     axes: [DVec3; 2],
     /// The corners along the axes.
     outline: Vec<DVec2>,
+    /// The convex solid that it is a face of, normals outwards.
+    pub solid: Option<u32>,
 }
 
 impl Panel {
@@ -31,7 +33,7 @@ impl Panel {
     pub fn new(corners: Vec<DVec3>, normal: DVec3) -> Panel {
         let (x, y) = normal.any_orthonormal_pair();
         let outline = corners.iter().map(|c| DVec2::new(x.dot(*c), y.dot(*c))).collect();
-        Panel { offset: normal.dot(corners[0]), normal, axes: [x, y], outline, corners }
+        Panel { offset: normal.dot(corners[0]), normal, axes: [x, y], outline, corners, solid: None }
     }
 
     /// A point along the axes of the plane.
@@ -137,24 +139,27 @@ fn near(scaled: [f64; 4], slack: f64) -> Vec<[i64; 4]> {
 
 /// The panels of an enclosure: facets and obstructions, united plane by plane.
 pub fn panels(enclosure: &Enclosure, planes: &mut Planes) -> Vec<Panel> {
-    let mut of_plane: Vec<Vec<&Facet>> = Vec::new();
+    let mut of_plane: Vec<(Vec<&Facet>, [bool; 2])> = Vec::new();
     for facet in enclosure.facets.iter().chain(&enclosure.obstructions) {
-        let (plane, _) = planes.find(facet);
-        of_plane.resize_with(planes.len(), Vec::new);
-        of_plane[plane as usize].push(facet);
+        let (plane, along) = planes.find(facet);
+        of_plane.resize_with(planes.len(), Default::default);
+        let (facets, faces) = &mut of_plane[plane as usize];
+        facets.push(facet);
+        faces[usize::from(along)] = true;
     }
     let mut panels = Vec::new();
-    for (plane, facets) in of_plane.iter().enumerate() {
-        let (normal, _) = planes.plane(plane as u32);
+    for (plane, (facets, faces)) in of_plane.iter().enumerate() {
         if let [facet] = facets[..]
             && facet.is_convex()
         {
             panels.push(Panel::new(facet.corners().to_vec(), facet.normal()));
             continue;
         }
-        panels.extend(
-            united(facets, normal, STRAIGHT * planes.touch).into_iter().map(|corners| Panel::new(corners, normal)),
-        );
+        // The side that all facets face, if there is one.
+        let (normal, _) = planes.plane(plane as u32);
+        let normal = if *faces == [true, false] { -normal } else { normal };
+        let pieces = united(facets, normal, STRAIGHT * planes.touch);
+        panels.extend(pieces.into_iter().map(|corners| Panel::new(corners, normal)));
     }
     panels
 }
