@@ -19,7 +19,7 @@ pub struct Exchange {
 
 /// The error of order n is at most this times (R/r)^2n A_i A_j/(π r²): twice the largest that was found among random
 /// pairs (test below).
-const CONSTANT: [f64; ORDERS] = [2.0, 0.6, 0.6];
+const CONSTANT: [f64; ORDERS] = [2.0, 0.6, 0.6, 0.3];
 
 /// Parts with R/r above this are too near for the expansion behind the bound.
 const NEAREST: f64 = 0.45;

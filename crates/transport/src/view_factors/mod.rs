@@ -29,7 +29,7 @@ use part::Part;
 use radiosity_scene::Enclosure;
 use rayon::prelude::*;
 use serde::Serialize;
-use shaft::{Stands, stands};
+use shaft::{Look, Stands, stands};
 use solid::find_solids;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use store::Entry;
@@ -86,8 +86,8 @@ pub struct Choices {
     pub facing_away: usize,
     /// Proven blocked.
     pub blocked: usize,
-    /// Proven clear, cubature of one, two, three points along an edge.
-    pub clear_cubature: [usize; 3],
+    /// Proven clear, cubature of one to four points along an edge.
+    pub clear_cubature: [usize; 4],
     /// Proven clear, closed form.
     pub clear_closed_form: usize,
     /// Mixed, found by cutting panels out.
@@ -208,7 +208,7 @@ impl Walk<'_> {
             if behind(&from.plane, &corners.corners) || behind(&to.plane, &corners.corners) {
                 continue;
             }
-            match stands(corners, &from.hull, &to.hull, self.touch) {
+            match stands(corners, &from.hull, &to.hull, self.touch, Look::Rough) {
                 Stands::Aside => {}
                 Stands::Between => left.push(panel),
                 Stands::Across => {
@@ -254,7 +254,7 @@ impl Walk<'_> {
             if behind(a) || behind(b) {
                 continue;
             }
-            match stands(panel, a.shape.corners(), b.shape.corners(), self.touch) {
+            match stands(panel, a.shape.corners(), b.shape.corners(), self.touch, Look::Close) {
                 Stands::Aside => {}
                 Stands::Between => panels.push(panel),
                 Stands::Across => {

@@ -19,9 +19,18 @@ pub enum Stands {
     Across,
 }
 
+/// How closely to look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// By the edges of the panel: some panels aside count as between.
+    Rough,
+    /// By the edges of the hull, too.
+    Close,
+}
+
 /// What `panel` does to segments from the hull of `from` to that of `to`. `touch` is the distance below which points
 /// count as lying on a plane.
-pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64) -> Stands {
+pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64, look: Look) -> Stands {
     let heights = |points: &[DVec3]| -> SmallVec<[f64; 8]> { points.iter().map(|p| panel.height(*p)).collect() };
     let (a, b) = (heights(from), heights(to));
     let side = |h: &[f64]| (h.iter().all(|h| *h >= -touch), h.iter().all(|h| *h <= touch));
@@ -80,7 +89,8 @@ pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64) -> Stands
     if all_within && parted {
         return Stands::Across;
     }
-    if is_parted_by_hull(&mut crossings, corners, touch) { Stands::Aside } else { Stands::Between }
+    let is_aside = look == Look::Close && is_parted_by_hull(&mut crossings, corners, touch);
+    if is_aside { Stands::Aside } else { Stands::Between }
 }
 
 /// Whether an edge of the hull of `points` parts it from the polygon `corners`.
@@ -127,7 +137,8 @@ mod tests {
     #[test]
     fn a_panel_is_aside_between_or_across() {
         let (a, b) = (square(0., [0., 0.], [1., 1.]), square(2., [0., 0.], [1., 1.]));
-        let is = |low: [f64; 2], high: [f64; 2], z: f64| stands(&panel(square(z, low, high)), &a, &b, 1e-7);
+        let is =
+            |low: [f64; 2], high: [f64; 2], z: f64| stands(&panel(square(z, low, high)), &a, &b, 1e-7, Look::Close);
         assert_eq!(is([-0.1, -0.1], [1.1, 1.1], 1.0), Stands::Across);
         assert_eq!(is([0.0, 0.0], [1.0, 1.0], 1.0), Stands::Across);
         assert_eq!(is([0.1, 0.0], [1.0, 1.0], 1.0), Stands::Between);
@@ -142,9 +153,9 @@ mod tests {
         let (a, b) = (square(0., [0., 0.], [1., 1.]), square(2., [0., 0.], [1., 1.]));
         let p = |x: f64, y: f64| DVec3::new(x, y, 1.0);
         let aside = panel(vec![p(0.5, -0.1), p(1.1, 0.5), p(1.5, -0.5)]);
-        assert_eq!(stands(&aside, &a, &b, 1e-7), Stands::Between);
+        assert_eq!(stands(&aside, &a, &b, 1e-7, Look::Close), Stands::Between);
         let aside = panel(vec![p(0.95, -0.2), p(1.2, 0.05), p(1.5, -0.5)]);
-        assert_eq!(stands(&aside, &a, &b, 1e-7), Stands::Aside);
+        assert_eq!(stands(&aside, &a, &b, 1e-7, Look::Close), Stands::Aside);
     }
 
     /// Where a panel cuts a set itself, nothing is proven but that it may matter.
@@ -157,6 +168,6 @@ mod tests {
             DVec3::new(0.5, 1., 1.),
             DVec3::new(0.5, 0., 1.),
         ]);
-        assert_eq!(stands(&through, &a, &b, 1e-7), Stands::Between);
+        assert_eq!(stands(&through, &a, &b, 1e-7, Look::Close), Stands::Between);
     }
 }

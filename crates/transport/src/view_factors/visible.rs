@@ -39,7 +39,7 @@ impl Shadows {
     /// Puts panels in the order of what they hide from a place, most first: what one hides whole need not be looked at
     /// again.
     pub fn sort(x: DVec3, normal: DVec3, target: &[DVec3], panels: &mut [&Panel], touch: f64) {
-        if panels.len() < 2 {
+        if panels.len() < 3 {
             return;
         }
         let hides = |panel: &&Panel| match shadow(x, panel, touch).map_or(Within::None, |s| within(target, &s)) {
