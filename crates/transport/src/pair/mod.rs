@@ -16,7 +16,7 @@ pub mod nusselt;
 pub mod point;
 pub mod sampled;
 mod segments;
-mod shadow;
+pub(crate) mod shadow;
 pub mod shapes;
 mod sight;
 mod smooth;

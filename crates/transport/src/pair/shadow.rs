@@ -39,6 +39,12 @@ pub fn cut_where_standing(polygons: &[Vec<DVec3>], plane: (DVec3, DVec3), blocke
 }
 
 fn seen_of(point: DVec3, normal: DVec3, polygon: &[DVec3], blockers: &[&[DVec3]]) -> f64 {
+    let pieces = visible(point, polygon, blockers);
+    pieces.iter().map(|piece| point_to_polygon(DVec3::ZERO, normal, piece)).sum()
+}
+
+/// The convex pieces, relative to the point, that the point sees of a convex polygon past convex blockers.
+pub fn visible(point: DVec3, polygon: &[DVec3], blockers: &[&[DVec3]]) -> Vec<Vec<DVec3>> {
     let mut pieces = vec![polygon.iter().map(|c| *c - point).collect::<Vec<_>>()];
     for blocker in blockers {
         // Relative to the point, and turned so that its normal points away from it.
@@ -61,7 +67,7 @@ fn seen_of(point: DVec3, normal: DVec3, polygon: &[DVec3], blockers: &[&[DVec3]]
         }
         pieces = left;
     }
-    pieces.iter().map(|piece| point_to_polygon(DVec3::ZERO, normal, piece)).sum()
+    pieces
 }
 
 /// Adds what of a convex piece is outside the intersection of half spaces; whole where the intersection misses it.
