@@ -171,9 +171,8 @@ fn galerkin(mesh: &NodeMesh, e: &[f64], rho: &[f64]) -> Vec<f64> {
     h
 }
 
-/// Collocation and linear Galerkin come to the same truth, and so to each other: their difference is no larger than what
-/// both are off, and falls with it. Galerkin's facets see their neighbours at a crease, and its order on these coarse
-/// spheres is still 1.7.
+/// Collocation and linear Galerkin come to the same truth, and so to each other: their difference is about what each is
+/// off, and falls with it; threefold and not quite fourfold, as Galerkin's order on these coarse spheres is still 1.7.
 #[test]
 fn catalogue_89_agrees_with_linear_galerkin() {
     let mut apart = Vec::new();
@@ -191,10 +190,11 @@ fn catalogue_89_agrees_with_linear_galerkin() {
         let off = |h: &[f64]| norm(h.iter().map(|h| h / exact_irradiance() - 1.0).collect());
         let (own, other) = (off(&nodal), off(&galerkin));
         let difference = norm(nodal.iter().zip(&galerkin).map(|(a, b)| (a - b) / exact_irradiance()).collect());
-        assert!(difference <= own + other && own <= 2.0 * other, "{own} {other} {difference}");
+        // Errors of opposite signs could be twice as far apart.
+        assert!(difference <= 1.3 * own.max(other) && own <= 2.0 * other, "{own} {other} {difference}");
         apart.push(difference);
     }
-    assert!(3.0 * apart[1] < apart[0], "{apart:?}");
+    assert!(3.0 * apart[1] < apart[0] && apart[1] < 2e-3, "{apart:?}");
 }
 
 /// A closed room, empty and with a box in it that stands free: constants are exact, past corners and shadows.
