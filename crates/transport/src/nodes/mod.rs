@@ -17,8 +17,8 @@
 //! one without being scaled.
 //!
 //! **At borders**, where surfaces meet at a crease or end, irradiance is the limit from inside: a node there looks from a
-//! point [`INSIDE`] triangles inwards. It fails where walls stand on the middle of triangles: the light jumps there and
-//! hats do not, so that triangles must be cut along walls and nodes split.
+//! point a millionth of its triangles' size inwards. It fails where walls stand on the middle of triangles: the light
+//! jumps there and hats do not, so that triangles must be cut along walls and nodes split.
 
 mod linear;
 mod mesh;
@@ -53,7 +53,7 @@ const HIDDEN: f64 = 1e-14;
 #[derive(Clone, Copy, Debug)]
 pub struct NodeOptions {
     /// Largest Σ_k |error of K_ik| in a row by quadrature, about. The default 1e-5 is far below what linear hats leave of
-    /// any field; a digit more costs half as much again. Sums of rows are exact in any case.
+    /// any field. Sums of rows are exact in any case.
     pub tolerance: f64,
 }
 
