@@ -1,8 +1,10 @@
-//! Everything that guards the main branch, in one command: format, import rule, licences, lints, tests, documentation.
+//! Everything that guards the main branch, in one command: format, import rule, licences, the catalogue of
+//! methods, lints, tests, documentation.
 //!
 //! The quick checks come first; the first failure ends the run. The import rule and the licences are judged here, from
 //! what `cargo metadata` says of every package in the lock file, for all platforms.
 
+mod catalogue;
 mod licence;
 mod rule;
 
@@ -22,6 +24,7 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
     let metadata = metadata()?;
     step("import rule", || verdict(rule::violations(&rule::crates(&metadata))))?;
     step("licences", || verdict(licence::violations(&licence::packages(&metadata))))?;
+    step("catalogue", || verdict(catalogue::violations(&root())))?;
     step("clippy", || cargo(&["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"], &[]))?;
     step("tests", || cargo(&["test", "--workspace", "--locked"], &[]))?;
     // Libraries only: the program and the library share the name `radiosity`, and so would their pages.

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 Usage: cargo xtask VERB
 
-  ci                                      run every check: format, import rule, licences, lints, tests, docs
+  ci                                      run every check: format, import rule, licences, catalogue, lints, tests, docs
   showcase [-o FILE]                      write the furnished living room (default out/showcase.glb)
   scenes building [--rooms N] -o FILE     write a closed building of N rooms joined by doors (default 16)
   scenes soup [--triangles N] -o FILE     write a closed room filled with small boxes (default 10000)

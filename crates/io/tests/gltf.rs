@@ -166,3 +166,44 @@ fn a_material_that_does_not_exist_is_named() {
     let text = File::new().load(json!({"meshes": mesh, "nodes": [{"mesh": 0}]})).unwrap_err();
     assert!(text.contains("material 7 of 1"), "{text}");
 }
+
+/// Catalogue 90: what no surface is, is told with the object or material, all of it at once.
+#[test]
+fn catalogue_90_ranges_are_named_with_the_object() {
+    let mut file = File::new();
+    file.add("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0]);
+    file.add("VEC3", &[f32::NAN, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let mesh = |position: usize, material: usize| json!({"primitives": [{"attributes": {"POSITION": position}, "material": material}]});
+    let rest = json!({
+        "meshes": [mesh(0, 0), mesh(2, 1), mesh(3, 2)],
+        "nodes": [{"name": "wall", "mesh": 0}, {"name": "line", "mesh": 1}, {"name": "hole", "mesh": 2}],
+        "materials": [
+            {"name": "too white", "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": [1.2, 0.5, 0.5, 1]}},
+            {"name": "dark lamp", "emissiveFactor": [-1, 0, 0]},
+            {"name": "odd lamp", "emissiveFactor": [1, 1, 1],
+                "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": -5}}},
+        ],
+    });
+    let loaded = File::load(file, rest).unwrap();
+    let said = loaded.faults.to_string();
+    for (name, what) in [
+        ("object 'line'", "no area"),
+        ("object 'hole'", "not finite"),
+        ("too white", "clamped to 0..1"),
+        ("dark lamp", "clamped to 0..1"),
+        ("odd lamp", "emissiveStrength is -5"),
+    ] {
+        assert!(said.lines().any(|line| line.contains(name) && line.contains(what)), "{name}: {what}\n{said}");
+    }
+    assert!(!loaded.scene.validate("t").has_errors());
+    // A scene made by hand is not mended but refused.
+    let mut scene = loaded.scene;
+    scene.materials[0].base_color[0] = 1.2;
+    scene.materials[1].emissive[0] = f32::NAN;
+    scene.positions[0].x = f64::NAN;
+    let said = scene.validate("t").to_string();
+    for what in ["base colour", "emission"] {
+        assert!(said.contains(what), "{what}\n{said}");
+    }
+    assert!(scene.validate("t").has_errors());
+}

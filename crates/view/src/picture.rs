@@ -200,6 +200,44 @@ const BAYER: [[u8; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use radiosity_scene::{Material, Mesh, Scene};
+
+    /// A square of the given material under an eye at the given angle from its normal, half a metre away.
+    fn square_seen(material: Material, angle: f64, irradiance: f32) -> Vec<Bands> {
+        let mut scene = Scene { materials: vec![material], ..Scene::default() };
+        scene.add_quad("square", 0, [[-9., 0., 9.], [9., 0., 9.], [9., 0., -9.], [-9., 0., -9.]].map(DVec3::from));
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let eye = 0.5 * DVec3::new(angle.sin(), angle.cos(), 0.0);
+        let view = ViewRays::new(&tracer, &Camera::look_at("eye", eye, DVec3::ZERO, DVec3::Z, 0.1), 4, 4);
+        view.picture(&vec![[irradiance; 3]; view.seen.len()]).pixels
+    }
+
+    /// Catalogue 0c: B = π lm/m² shows as exactly 1 cd/m², emitted or reflected.
+    #[test]
+    fn catalogue_0c_radiosity_of_pi_is_luminance_of_one() {
+        let glowing = Material { base_color: [0.0, 0.0, 0.0, 1.0], emissive: [1.0; 3], ..Material::default() };
+        assert!(square_seen(glowing, 0.3, 0.0).iter().all(|pixel| *pixel == [1.0; 3]));
+        // ρ = ½ under 2π lx.
+        let grey = Material { base_color: [0.5, 0.5, 0.5, 1.0], ..Material::default() };
+        assert!(square_seen(grey, 0.3, std::f32::consts::TAU).iter().all(|pixel| *pixel == [1.0; 3]));
+    }
+
+    /// Catalogue 2: a diffuse surface shows the same luminance from any angle, to one unit in the last place.
+    #[test]
+    fn catalogue_2_luminance_does_not_depend_on_the_angle() {
+        let material =
+            Material { base_color: [0.7, 0.31, 0.05, 1.0], emissive: [0.1, 0.0, 3.0], ..Material::default() };
+        let first = square_seen(material.clone(), 0.0, 123.4)[0];
+        for angle in [0.0, 0.2, 0.7, 1.1, 1.4, 1.5, -1.3] {
+            for pixel in square_seen(material.clone(), angle, 123.4) {
+                for band in 0..3 {
+                    let apart = pixel[band].to_bits().abs_diff(first[band].to_bits());
+                    assert!(apart <= 1, "{angle}: {} and {}", pixel[band], first[band]);
+                }
+            }
+        }
+    }
 
     #[test]
     fn a_grey_picture_is_exposed_to_middle_grey() {

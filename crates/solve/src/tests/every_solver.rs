@@ -199,6 +199,31 @@ fn catalogue_35_bound_holds_at_every_step_of_every_solver() {
     }
 }
 
+/// Catalogue 42: what is asked for is kept, decade by decade, by every solver without chance on every system: the true
+/// residual is at most the tolerance, and so ‖B − B*‖ at most tolerance ‖E‖/(1 − ρ_max) in the norm of areas, where F is
+/// reciprocal and its rows sum to one; and the bound that is told is never below the largest error.
+#[test]
+fn catalogue_42_what_is_asked_for_is_kept() {
+    let bright = box_of([1.0; 3], 3).closed().system(|face| [0.2, 0.9, 0.0, 0.5, 0.95, 0.6][face], |_, c| c[0]);
+    for (system, largest) in [(cube(0.8), 0.8), (room(3), 0.9), (bright, 0.95)] {
+        let exact = system.exact();
+        let area = &system.transport.space().area;
+        let norm = |x: &[f64]| x.iter().zip(area).map(|(x, a)| a * x * x).sum::<f64>().sqrt();
+        for solver in certain() {
+            for tolerance in (1..12).map(|k| 0.1f64.powi(k)) {
+                let (b, info) = system.solve(solver, &Params { tolerance, ..tight() }).unwrap();
+                let residual = system.residual(&b);
+                assert!(residual <= tolerance * 1.001 + 1e-14, "{solver}, {tolerance:e}: {residual:e}");
+                let off: Vec<f64> = b.iter().zip(&exact).map(|(b, x)| b - x).collect();
+                let allowed = tolerance * norm(&system.e) / (1.0 - largest) + 1e-11;
+                assert!(norm(&off) <= allowed, "{solver}, {tolerance:e}: {:e} of {allowed:e}", norm(&off));
+                let worst = off.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                assert!(worst <= info.bound[0] + 1e-11, "{solver}, {tolerance:e}: {worst:e} of {:e}", info.bound[0]);
+            }
+        }
+    }
+}
+
 /// Catalogue 35: what no surface reflects is refused, with its place.
 #[test]
 fn catalogue_35_reflectances_are_checked() {
