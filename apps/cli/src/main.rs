@@ -2,6 +2,7 @@
 
 mod bake;
 mod check;
+mod compare;
 mod factors;
 mod faults;
 mod figures;
@@ -64,6 +65,8 @@ enum Verb {
     Render(render::Arguments),
     /// View factors between surfaces, for heat and for study.
     Factors(factors::Arguments),
+    /// Form-factor methods and solvers side by side: time, memory, error, as tables and plots.
+    Compare(compare::Arguments),
     /// Every fault of a scene, and what is in it.
     Check(check::Arguments),
 }
@@ -123,6 +126,7 @@ fn work(cli: &Cli, progress: &progress::Progress) -> Result<(), Failure> {
         Verb::Measure(arguments) => measure::run(arguments, &cli.global, progress),
         Verb::Render(arguments) => render::run(arguments, &cli.global, progress),
         Verb::Factors(arguments) => factors::run(arguments, &cli.global, progress),
+        Verb::Compare(arguments) => compare::run(arguments, &cli.global, progress),
         Verb::Check(arguments) => check::run(arguments, &cli.global),
     }
 }
@@ -173,6 +177,7 @@ impl From<radiosity::Error> for Failure {
             radiosity::Error::Empty(_)
             | radiosity::Error::Memory { .. }
             | radiosity::Error::Factors(_)
+            | radiosity::Error::Matrix { .. }
             | radiosity::Error::Element(_)
             | radiosity::Error::Lightmap(_) => Failure::input(error),
             other => Failure::work(other),

@@ -92,6 +92,15 @@ pub fn form_factors(text: &str) -> Result<FormFactors, String> {
     text.parse().map(|method| FormFactors(Some(method))).map_err(|error| format!("{error}, or rays"))
 }
 
+/// A time in seconds. A number without a unit is refused, as it may mean anything.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let scales = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
+    let scaled = scales.iter().find_map(|(unit, scale)| Some((text.strip_suffix(unit)?.trim_end(), *scale)));
+    let value = scaled.and_then(|(number, scale)| Some(positive(number).ok()? * scale));
+    let wrong = "use a time with its unit from 1s to 24h, such as 60s or 5min";
+    value.filter(|s| (1.0..=86_400.0).contains(s)).ok_or_else(|| wrong.to_owned())
+}
+
 /// Size of a picture, WIDTHxHEIGHT.
 pub fn size(text: &str) -> Result<(u32, u32), String> {
     let wrong = || "use WIDTHxHEIGHT, e.g. 1280x720, each from 1 to 16384".to_owned();
@@ -132,6 +141,10 @@ mod tests {
         assert_eq!([fixed(-0.004, 2), fixed(-0.006, 2), fixed(-10.0, 0)], ["0.00", "-0.01", "-10"]);
         assert!(angle("50") == Ok(50.0) && angle("0").is_err() && angle("180").is_err());
         assert_eq!(size("1280x720"), Ok((1280, 720)));
+        assert_eq!([seconds("60s"), seconds("1.5 min"), seconds("1h")], [Ok(60.0), Ok(90.0), Ok(3600.0)]);
+        for wrong in ["60", "s", "-1s", "0.1s", "nan s", "25h", "1m"] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
         assert!(size("0x5").is_err() && size("5").is_err());
         assert_eq!(unit("mm"), Ok(0.001));
         assert!(unit("0").is_err());

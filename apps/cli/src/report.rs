@@ -343,7 +343,7 @@ fn other_light(input: &input::Input, has_lights: bool) -> Vec<String> {
 }
 
 /// The command line as given; the program by its name, wherever it is installed.
-fn command() -> Vec<String> {
+pub fn command() -> Vec<String> {
     let arguments = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
     std::iter::once("radiosity".to_owned()).chain(arguments).collect()
 }
@@ -356,7 +356,7 @@ fn peak_memory_mb() -> Option<f64> {
 }
 
 /// A moment to the minute, in the calendar of the civil day (Hinnant, "chrono-compatible low-level date algorithms").
-fn utc(moment: SystemTime) -> String {
+pub fn utc(moment: SystemTime) -> String {
     let seconds = moment.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
     let (days, minutes) = (seconds / 86_400, seconds / 60 % 1440);
     // Years begin in March here, so that the leap day is the last; eras are of 400 years.

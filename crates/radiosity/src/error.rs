@@ -24,6 +24,24 @@ pub enum Error {
         /// Megabytes allowed.
         allowed: usize,
     },
+    /// The memory that was allowed does not hold form factors between all elements.
+    #[error(
+        "form factors between {elements} elements need {needed} MB; {allowed} MB are allowed (ask for fewer elements than \
+         {asked}, though each triangle is one at least, or allow more)"
+    )]
+    Matrix {
+        /// Elements there would be.
+        elements: usize,
+        /// Elements asked for.
+        asked: usize,
+        /// Megabytes needed.
+        needed: usize,
+        /// Megabytes allowed.
+        allowed: usize,
+    },
+    /// An element is no polygon that form factors can be asked of.
+    #[error("{0}")]
+    Element(radiosity_scene::ElementError),
     /// The lightmap cannot be laid out.
     #[error("lightmap: {0}")]
     Lightmap(radiosity_view::lightmap::LightmapError),

@@ -16,6 +16,7 @@
 pub mod answer;
 pub mod bake;
 mod canvas;
+pub mod compare;
 mod cornell;
 mod division;
 mod equation;
@@ -35,6 +36,7 @@ mod viewpoint;
 
 pub use answer::{Answer, Indirect};
 pub use bake::{BakeOptions, Baked, bake};
+pub use compare::{CompareOptions, Comparison, compare};
 pub use cornell::cornell_box;
 pub use error::Error;
 pub use factors::{Factors, FactorsOptions, factors};

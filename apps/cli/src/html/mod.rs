@@ -4,12 +4,18 @@
 //! What a reader needs first comes first: is the asked error reached, what does it look like, how bright is it; then
 //! how far to trust it and what it cost; last, how to do it again. All text from outside is escaped.
 
+mod compare;
+mod compare_methods;
+mod compare_plot;
+mod compare_solvers;
 mod light;
 mod markup;
 mod plot;
 #[cfg(test)]
 mod tests;
 mod trust;
+
+pub use compare::comparison;
 
 use crate::figures;
 use crate::report::{ErrorReport, Report};

@@ -114,7 +114,7 @@ pub fn convergence(rounds: &[Round], asked: f64) -> String {
 }
 
 /// Decimal logarithms of a range that holds all positive finite values with a margin, and is at least a decade wide.
-fn log_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub fn log_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let logs = values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10);
     let (low, high) = logs.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
     let margin = (0.5 * (1.0 - (high - low))).max(0.12);
@@ -122,7 +122,7 @@ fn log_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// Round values between two decimal logarithms: 1, 2, 5 in each decade, or whole decades where those would crowd.
-fn ticks(low: f64, high: f64) -> Vec<f64> {
+pub fn ticks(low: f64, high: f64) -> Vec<f64> {
     let stride = ((high - low) / 6.0).ceil().max(1.0) as usize;
     let steps: &[f64] = if high - low <= 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
     let decades = (low.floor() as i32..=high.ceil() as i32).step_by(stride);
