@@ -159,6 +159,16 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("measure --points none.csv", "none.csv: cannot be read"),
         ("measure --points bad.csv", "no column nx, ny, nz"),
         ("check none.obj", "none.obj: cannot be read"),
+        (
+            "compare --methods hemicub",
+            "no form-factor method is called \"hemicub\"; there are rays, adaptive, hemicube",
+        ),
+        ("compare --methods=", "no form-factor method is called \"\""),
+        ("compare --solvers cg,gauss", "no solver is called \"gauss\"; there are jacobi"),
+        ("compare --budget 60", "with its unit from 1s to 24h"),
+        ("compare --elements 0", "4..=1000000"),
+        ("compare --memory 1M", "ask for fewer elements"),
+        ("compare -o a.pdf", "must end in .html or .json"),
     ] {
         let run = room.run(call.split_whitespace());
         assert_eq!(run.code, Some(2), "{call}: {run:?}");
@@ -722,4 +732,31 @@ fn classic_methods_and_solvers_by_name() {
     };
     refused(["--ff", "guess"], "cubic-tetrahedron");
     refused(["--solver", "guess"], "gauss-seidel");
+}
+
+/// The page of a comparison stands alone, the numbers are whole, and standard output has both kinds of answer.
+#[test]
+fn a_comparison_is_written_as_a_page_and_as_numbers() {
+    let room = Room::new("compare");
+    const FEW: &str =
+        "compare --elements 40 --methods rays,adaptive,cubature --solvers cg,progressive,gauss-seidel --budget 4s";
+    let result = room.run(format!("--json -q {FEW} -o a.html -o a.json").split(' ')).result();
+    assert_eq!(room.names(), ["a.html", "a.json"]);
+    assert_eq!(result["output"], serde_json::json!(["a.html", "a.json"]));
+    let numbers: Value = serde_json::from_slice(&room.read("a.json")).unwrap();
+    assert_eq!((&numbers["trials"], &numbers["marches"]), (&result["trials"], &result["marches"]));
+    assert!(numbers["trials"].as_array().unwrap().iter().any(|t| t["method"] == "rays" && t["light_error"].is_f64()));
+    let page = String::from_utf8(room.read("a.html")).unwrap();
+    for outside in ["http:", "https:", "//", "<script", "<link", "@import"] {
+        let own =
+            page.split("base64,").map(|part| part.split_once('"').map_or(part, |(_, rest)| rest)).collect::<String>();
+        assert!(!own.contains(outside), "{outside}");
+    }
+    for said in ["When shooting", "What each got wrong", "gauss-seidel", "data:image/png", "Content-Security-Policy"] {
+        assert!(page.to_lowercase().contains(&said.to_lowercase()), "{said}");
+    }
+    assert!(!page.contains("NaN") && page.ends_with("</html>\n"));
+    let table = room.run(FEW.split(' '));
+    assert_eq!(table.code, Some(0), "{table:?}");
+    assert!(table.out.contains("progressive") && table.out.contains("light off"), "{}", table.out);
 }

@@ -104,26 +104,33 @@ fn corners(all: &Comparison) -> Option<[String; 2]> {
     let trial = all.trials.iter().rfind(single).unwrap_or(trial);
     let first = all.trials.iter().find(single).unwrap_or(trial);
     let [near, pairs] = trial.wrong.causes.near;
-    let mut text = format!(
-        "It looks out from the centre of an element. A facet nearer than the element is wide looks different from there \
-         than from the element's other places, and no number of cells mends that: with {} such pairs, {} of all, make {} \
-         of the squared error of its light",
+    let mut text =
+        "It looks out from the centre of an element. A facet nearer than the element is wide looks different from \
+                    there than from the element’s other places, and no number of cells mends that: "
+            .to_owned();
+    if first.label != trial.label {
+        text += &format!(
+            "from {} to {} the error of its factors only goes from {} to {}. ",
+            escape(&first.label),
+            escape(&trial.label),
+            percent(first.factor_error),
+            percent(trial.factor_error)
+        );
+    }
+    text += &format!(
+        "Seen with {} such pairs, {} of all, make {} of the squared error of its light.",
         escape(&trial.label),
         percent(pairs),
         percent(near)
     );
-    if first.label != trial.label {
-        text += &format!(" (with {} they made {})", escape(&first.label), percent(first.wrong.causes.near[0]));
-    }
-    text += ".";
     let spread = all.trials.iter().find(|t| t.method == "hemicube" && t.label.contains("points"));
     if let Some(spread) = spread {
         text += &format!(
-            " More places to look from do: {} is {} off where {} is {}.",
+            " More places to look from do mend it: with {} its factors are {} off and its light {}, after {}.",
             escape(&spread.label),
+            percent(spread.factor_error),
             percent(spread.light_error),
-            escape(&first.label),
-            percent(first.light_error)
+            duration(spread.seconds)
         );
     }
     Some(["The hemicube fails in corners, not for want of cells.".to_owned(), text])

@@ -52,7 +52,7 @@ pub fn pictures(all: &Comparison) -> Result<String, Failure> {
     if let Some(picture) = &all.picture {
         let Picture { width, height, .. } = *picture;
         let png = encode_png(width, height, &picture.tone_mapped(all.exposure)).map_err(Failure::work)?;
-        figures += &image(&png, "exact", "the light itself, one value for each element");
+        figures += &image(&png, "The light", "exact, one value for each element");
     }
     for view in &all.views {
         let Some(trial) = all.trials.get(view.trial) else { continue };
@@ -79,21 +79,13 @@ fn ramp() -> String {
             format!("#{r:02x}{g:02x}{b:02x} {}%", 5 * k)
         })
         .collect();
-    let marks = [
-        (-0.5, "50\u{a0}% too dark", ""),
-        (-0.1, "10", ""),
-        (-0.01, "1", "minor"),
-        (0.0, "0", ""),
-        (0.01, "1", "minor"),
-        (0.1, "10", ""),
-        (0.5, "50\u{a0}% too bright", ""),
-    ];
-    let mark = |(d, text, class): (f64, &str, &str)| {
-        format!("<span class=\"{class}\" style=\"left:{:.1}%\">{text}</span>", 50.0 * (1.0 + place(d)))
-    };
+    let marks =
+        [(-0.5, "−50\u{a0}%"), (-0.1, "−10"), (-0.01, "−1"), (0.0, "0"), (0.01, "1"), (0.1, "10"), (0.5, "50\u{a0}%")];
+    let mark = |(d, text): (f64, &str)| format!("<span style=\"left:{:.1}%\">{text}</span>", 50.0 * (1.0 + place(d)));
     let marks: String = marks.into_iter().map(mark).collect();
     format!(
-        "<div class=\"ramp\"><div style=\"background:linear-gradient(90deg,{})\"></div>{marks}</div>",
+        "<p class=\"ends\"><span>too dark</span><span>too bright</span></p>\
+         <div class=\"ramp\"><div style=\"background:linear-gradient(90deg,{})\"></div>{marks}</div>",
         stops.join(",")
     )
 }
@@ -139,44 +131,46 @@ pub fn errors(all: &Comparison) -> String {
 }
 
 fn trials(all: &Comparison) -> String {
-    let row = |t: &Trial| {
+    let row = |(k, t): (usize, &Trial)| {
         let megabytes = t.bytes as f64 / f64::from(1 << 20);
+        let is_first = k == 0 || all.trials[k - 1].method != t.method;
         vec![
-            t.method.to_owned(),
+            if is_first { format!("<b>{}</b>", t.method) } else { String::new() },
             escape(&t.label),
             duration(t.seconds),
-            t.processor_seconds.map_or("–".to_owned(), duration),
-            with_unit(megabytes, "MB"),
-            t.samples.map_or("–".to_owned(), count),
+            percent(t.light_error),
             percent(t.factor_error),
             number(t.largest_factor_error),
             t.covered.map_or("–".to_owned(), share),
-            number(t.row_sum_error),
-            number(t.reciprocity),
-            percent(t.light_error),
+            with_unit(megabytes, "MB"),
             percent(t.bias),
             percent(t.error_from_truth),
+            number(t.row_sum_error),
+            t.samples.map_or("–".to_owned(), count),
             share(t.factor_share),
+            t.processor_seconds.map_or("–".to_owned(), duration),
+            number(t.reciprocity),
         ]
     };
     let head = [
         "Method",
         "Setting",
         "Time",
-        "Processor",
-        "Memory",
-        "Rays or cells a row",
+        "Light off",
         "F off",
         "Largest",
         "Covered",
-        "Row sums off",
-        "Reciprocity off",
-        "Light off",
+        "Memory",
         "Bias",
         "From the truth",
+        "Row sums off",
+        "Rays, cells a row",
         "F’s share of time",
+        "Processor",
+        "Reciprocity off",
     ];
-    table(&head, &all.trials.iter().map(row).collect::<Vec<_>>())
+    let rows: Vec<Vec<String>> = all.trials.iter().enumerate().map(row).collect();
+    format!("<div class=\"trials\">{}</div>", table(&head, &rows))
 }
 
 fn skipped(all: &Comparison) -> String {
@@ -261,13 +255,14 @@ fn said(t: &Trial) -> String {
         format!("{} {side}", percent(w.relative.abs()))
     };
     let samples = match w.samples {
-        Some(samples) if samples < 1e4 => format!(", {} {cells}’ worth,", number(samples)),
+        Some(samples) if samples < 1e4 => format!(" and {} {cells} large", number(samples)),
         _ => String::new(),
     };
-    let from = if w.from_object == w.object { "itself".to_owned() } else { object(&w.from_object) };
+    let from = if w.from_object == w.object { "the same".to_owned() } else { object(&w.from_object) };
     format!(
-        "{} of its squared error, in {} of the pairs, {what}. Worst is an element of {} at {x}, {y}, {z}\u{a0}m: {worst}, \
-         most of it by a facet of {from}, {} of its widths away,{samples} to which the factor is {} instead of {}.",
+        "{} of its squared error, in {} of the pairs, {what}. The element that adds most to it is one of {} at {x}, {y}, \
+         {z}\u{a0}m: {worst}, most of it by a facet of {from}, {} of its widths away{samples}, to which its factor is {} \
+         instead of {}.",
         share(part),
         share(pairs),
         object(&w.object),

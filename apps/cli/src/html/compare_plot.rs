@@ -83,13 +83,9 @@ pub fn plot(curves: &[Curve], levels: &[Level], axes: &Axes) -> String {
     }
     out += "<line class=\"axis\" x1=\"0\" x2=\"0\" y1=\"0\" y2=\"100%\"/>\
             <line class=\"axis\" x1=\"0\" x2=\"100%\" y1=\"100%\" y2=\"100%\"/>";
-    for level in levels_shown {
+    for level in levels_shown.clone() {
         let y = 100.0 * place([1.0, shown(level.at)])[1];
         out += &format!("<line class=\"level\" x1=\"0\" x2=\"100%\" y1=\"{y:.2}%\" y2=\"{y:.2}%\"/>");
-        out += &format!(
-            "<text class=\"said\" x=\"100%\" dx=\"-4\" y=\"{y:.2}%\" dy=\"-5\" text-anchor=\"end\">{}</text>",
-            level.name
-        );
     }
 
     // Lines, cut off where the box ends.
@@ -130,6 +126,20 @@ pub fn plot(curves: &[Curve], levels: &[Level], axes: &Axes) -> String {
                 badge(k)
             );
         }
+    }
+    // What a level says stands at the side where fewer curves are.
+    for level in levels_shown {
+        let y = place([1.0, shown(level.at)])[1];
+        let near = |from: f64, to: f64| {
+            let is_near = |p: &[f64; 2]| (from..to).contains(&p[0]) && (y - p[1]).abs() < 0.07;
+            points().map(place).filter(is_near).count()
+        };
+        let (x, dx, anchor) = if near(0.0, 0.25) <= near(0.75, 1.01) { (0, 8, "start") } else { (100, -4, "end") };
+        badges += &format!(
+            "<text class=\"said\" x=\"{x}%\" dx=\"{dx}\" y=\"{:.2}%\" dy=\"-6\" text-anchor=\"{anchor}\">{}</text>",
+            100.0 * y,
+            level.name
+        );
     }
     let legend: String = curves
         .iter()

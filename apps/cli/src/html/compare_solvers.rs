@@ -39,7 +39,7 @@ pub fn take_away(all: &Comparison) -> Option<[String; 2]> {
     let shooting = of(early, Family::Shooting)?;
     let gathering = of(early, Family::Gathering);
     let mut text = format!(
-        "After {} of a sweep <code>{}</code> shows a picture that is {} off",
+        "After {} of a sweep <code>{}</code> shows a picture that is {} off, of full white",
         number(early.work),
         shooting.0,
         percent(shooting.1)
@@ -50,14 +50,15 @@ pub fn take_away(all: &Comparison) -> Option<[String; 2]> {
     }
     text += ". ";
     text += &all.leads.iter().skip(1).map(lead).collect::<Vec<_>>().join(" ");
-    let crossed: Vec<String> = all.crossings.iter().take(3).map(crossing).collect();
-    text += &format!(" {}", crossed.join(" "));
-    let wins = |family| all.leads.last().and_then(|lead| lead.ranks.first()).is_some_and(|best| best.0 == family);
-    let head = match wins(Family::Shooting) {
-        true => "Shooting has the picture first, and keeps it.",
-        false => "Shooting has the picture first; what follows has the digits.",
+    if let Some(c) = all.crossings.iter().find(|c| c.late == "gauss-seidel") {
+        text += &format!(" {}", crossing(c));
+    }
+    let last = all.leads.last().and_then(|lead| lead.ranks.first()).map(|best| best.0);
+    let head = match last {
+        None | Some(Family::Shooting) => "Shooting has the picture first, and keeps ahead.".to_owned(),
+        Some(family) => format!("Shooting has the picture first, {} the last digits.", family.name()),
     };
-    Some([head.to_owned(), text])
+    Some([head, text])
 }
 
 fn of(lead: &Lead, family: Family) -> Option<(&'static str, f64)> {
@@ -101,7 +102,8 @@ pub fn solvers(all: &Comparison) -> String {
     let axes =
         |title, x, write_x, floor, from| Axes { title, x, write_x, write_y: power_percent, floor: Some(floor), from };
     let work = "work, applications of F (sweeps)";
-    let legend = [Family::Gathering, Family::Shooting, Family::Krylov, Family::Direct, Family::Random]
+    // Elimination has no way to draw.
+    let legend = [Family::Gathering, Family::Shooting, Family::Krylov, Family::Random]
         .map(|family| format!("<span><i class=\"{}\"></i>{}</span>", color(family), family.name()))
         .concat();
     let displayed = plot(
@@ -127,7 +129,7 @@ pub fn solvers(all: &Comparison) -> String {
          where it has one. A sweep is one application of F to all three bands; a shot is an N-th of it. Residuals are relative, \
          the worst band. Sweeps of gathering run through memory in order and shots do not, so that a unit of work takes \
          shooting longer where factors are stored; where they are made as they are needed, a shot needs one column and a sweep all of \
-         them, and work is time.",
+         them, and work is time. Elimination has nothing on the way and is in the table only.",
     );
     section(
         "Solvers: when shooting beats gathering",
@@ -170,5 +172,5 @@ fn solver_table(all: &Comparison) -> String {
         "Residual",
         "Error of B",
     ];
-    table(&head, &all.marches.iter().map(row).collect::<Vec<_>>())
+    format!("<div class=\"solvers\">{}</div>", table(&head, &all.marches.iter().map(row).collect::<Vec<_>>()))
 }

@@ -1,1 +1,189 @@
+//! Small scenes on which the comparison must come out as theory says.
 
+use super::*;
+use crate::cornell_box;
+use glam::DVec3;
+use problem::Problem;
+use radiosity_scene::{Material, Mesh, Scene};
+use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors};
+use trial::each_pair;
+
+/// Time that is never over.
+const AMPLE: f64 = 1e6;
+
+fn options(methods: &[&str], solvers: &[Solver]) -> CompareOptions {
+    CompareOptions {
+        elements: 80,
+        methods: methods.iter().map(|name| name.parse().unwrap()).collect(),
+        solvers: solvers.to_vec(),
+        seconds: AMPLE,
+        audit: (200, 16),
+        side: 48,
+        ..CompareOptions::default()
+    }
+}
+
+fn on_cornell_box(options: &CompareOptions) -> Result<Comparison, Error> {
+    let scene = cornell_box();
+    let mesh = Mesh::new(&scene);
+    compare(&Tracer::new(&scene, &mesh), options, &())
+}
+
+/// All without what depends on the clock.
+fn timeless(value: &mut serde_json::Value) {
+    const TIMES: [&str; 8] = [
+        "seconds",
+        "processor_seconds",
+        "solve_seconds",
+        "factor_share",
+        "engine_seconds",
+        "time_exponent",
+        "budget",
+        "estimated_seconds",
+    ];
+    match value {
+        serde_json::Value::Object(map) => {
+            map.retain(|name, _| !TIMES.contains(&name.as_str()));
+            map.values_mut().for_each(timeless);
+        }
+        serde_json::Value::Array(all) => all.iter_mut().for_each(timeless),
+        _ => {}
+    }
+}
+
+#[test]
+fn the_exact_method_is_nearest_and_numbers_are_the_same_again() {
+    let solvers = [Solver::Jacobi, Solver::Progressive, Solver::ShootingAmbient, Solver::Cg, Solver::Lu];
+    let options = options(&["rays", "adaptive", "hemisphere", "single-plane", "point", "exact"], &solvers);
+    let found = on_cornell_box(&options).unwrap();
+    let last = |name: &str| found.trials.iter().rfind(|t| t.method == name).unwrap_or_else(|| panic!("{name}"));
+    assert!(found.skipped.is_empty(), "{:?}", found.skipped);
+
+    // Factors: the adaptive ones are nearest, what sees no occlusion is far off, and more rays are better.
+    let adaptive = last("adaptive");
+    for other in found.trials.iter().filter(|t| t.method != "adaptive") {
+        assert!(adaptive.light_error < other.light_error, "{} {}", other.method, other.label);
+        assert!((0.0..=1.0).contains(&other.factor_share) && other.bytes > 0 && other.seconds > 0.0);
+        let causes = other.wrong.causes.ranked().iter().map(|(_, shares)| shares[0]).sum::<f64>();
+        assert!((causes - 1.0).abs() < 1e-9, "{}: {causes}", other.method);
+    }
+    assert!(adaptive.covered.unwrap() > 0.99 && last("exact").light_error > 0.2);
+    let rays: Vec<f64> = found.trials.iter().filter(|t| t.method == "rays").map(|t| t.light_error).collect();
+    assert!(rays.last() < rays.first() && rays[4] < 0.02, "{rays:?}");
+    assert!(found.reference.uncertainty < 1e-3 && found.reference.residual < 1e-12, "{:?}", found.reference);
+    assert!(found.truth.constant.error > found.truth.engine.error);
+
+    // Solvers: elimination is exact, all end near it, shooting has a picture before gathering has.
+    let march = |solver: Solver| found.marches.iter().find(|m| m.solver == solver.name()).unwrap();
+    assert!(march(Solver::Lu).marks[0].error < 1e-10);
+    for march in &found.marches {
+        let end = march.marks.last().unwrap();
+        assert!(march.converged && end.displayed < 1e-6 && end.error < 1e-5, "{}: {end:?}", march.solver);
+        assert!(march.marks.is_sorted_by(|a, b| a.work <= b.work), "{}", march.solver);
+    }
+    let early = |solver: Solver| march(solver).at(0.2).unwrap().displayed;
+    assert!(early(Solver::ShootingAmbient) < 0.5 * early(Solver::Jacobi));
+    assert_eq!(found.leads[0].ranks[0].0, Family::Shooting);
+
+    // Tables grow with the mesh, matrices with its square.
+    let growth = |name: &str| found.growth.iter().find(|g| g.method == name).unwrap().memory_exponent.unwrap();
+    assert!((growth("rays") - 1.0).abs() < 0.05 && (1.6..2.4).contains(&growth("point")));
+    assert!(found.views.iter().all(|v| v.pixels.len() == 48 * 48));
+
+    let again = on_cornell_box(&options).unwrap();
+    let [mut a, mut b] = [found, again].map(|c| serde_json::to_value(c).unwrap());
+    timeless(&mut a);
+    timeless(&mut b);
+    assert_eq!(a, b);
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let few = options(&["rays"], &[]);
+    let error = on_cornell_box(&CompareOptions { memory: 1000, ..few.clone() }).unwrap_err();
+    assert!(matches!(error, Error::Matrix { .. }), "{error}");
+    assert!(error.to_string().contains("fewer elements"), "{error}");
+    let nothing = CompareOptions { methods: Vec::new(), ..few.clone() };
+    assert!(matches!(on_cornell_box(&nothing), Err(Error::Empty(_))));
+    let mut dark = cornell_box();
+    dark.materials.iter_mut().for_each(|material| material.emissive = [0.0; 3]);
+    let mesh = Mesh::new(&dark);
+    let error = compare(&Tracer::new(&dark, &mesh), &few, &()).unwrap_err();
+    assert!(error.to_string().contains("no light"), "{error}");
+    struct Stop;
+    impl Monitor for Stop {
+        fn step(&self, _done: usize, _total: usize) -> bool {
+            false
+        }
+    }
+    let mesh = Mesh::new(&cornell_box());
+    let scene = cornell_box();
+    assert!(matches!(compare(&Tracer::new(&scene, &mesh), &few, &Stop), Err(Error::Stopped)));
+}
+
+/// No time at all: who would take too long is named with his time, and is not run.
+#[test]
+fn who_takes_too_long_is_named() {
+    let options = CompareOptions { seconds: 1e-3, ..options(&["cubature"], &[Solver::Cg]) };
+    let found = on_cornell_box(&options).unwrap();
+    assert!(found.trials.is_empty() && found.skipped[0].estimated_seconds > 1e-3, "{:?}", found.skipped);
+    assert_eq!(found.skipped[0].method, "cubature");
+}
+
+/// A room with a plate that hangs in it.
+fn room_with_plate() -> Scene {
+    let mut scene = Scene::default();
+    let white = Material { base_color: [0.6, 0.6, 0.6, 1.0], ..Material::default() };
+    let lamp = Material { emissive: [100.0; 3], ..white.clone() };
+    let plate = Material { double_sided: true, ..white.clone() };
+    scene.materials = vec![white, lamp, plate];
+    let p = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+    scene.add_quad("floor", 0, [p(0., 0., 0.), p(0., 0., 1.), p(1., 0., 1.), p(1., 0., 0.)]);
+    scene.add_quad("ceiling", 1, [p(0., 1., 0.), p(1., 1., 0.), p(1., 1., 1.), p(0., 1., 1.)]);
+    scene.add_quad("left", 0, [p(0., 0., 0.), p(0., 1., 0.), p(0., 1., 1.), p(0., 0., 1.)]);
+    scene.add_quad("right", 0, [p(1., 0., 0.), p(1., 0., 1.), p(1., 1., 1.), p(1., 1., 0.)]);
+    scene.add_quad("back", 0, [p(0., 0., 0.), p(1., 0., 0.), p(1., 1., 0.), p(0., 1., 0.)]);
+    scene.add_quad("front", 0, [p(0., 0., 1.), p(0., 1., 1.), p(1., 1., 1.), p(1., 0., 1.)]);
+    scene.add_quad("plate", 2, [p(0.3, 0.4, 0.3), p(0.3, 0.4, 0.7), p(0.7, 0.4, 0.7), p(0.7, 0.4, 0.3)]);
+    scene
+}
+
+/// Whatever surface is projected on, and however pairs are integrated, factors are the same within the sum of what the
+/// methods state as their errors, past something that stands between. Three standard errors and doubts that rest on what was seen
+/// are no proof: one pair in a hundred may be off by more.
+#[test]
+fn catalogue_91_all_methods_agree_within_their_stated_errors() {
+    let scene = room_with_plate();
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let problem = Problem::new(&tracer, 60, 1 << 30, &()).unwrap();
+    let names = [
+        "adaptive",
+        "hemicube",
+        "single-plane",
+        "cubic-tetrahedron",
+        "global-cube",
+        "hemisphere",
+        "point",
+        "disc",
+        "malley",
+    ];
+    let look = radiosity_transport::row::Look { resolution: 64, ..Default::default() };
+    let options = FormFactorOptions { look, ..FormFactorOptions::default() };
+    let factors = names.map(|name| {
+        let method: FormFactorMethod = name.parse().unwrap();
+        FormFactors::new(method, &problem.enclosure, &options, &()).unwrap()
+    });
+    for (i, a) in factors.iter().enumerate() {
+        for (j, b) in factors.iter().enumerate().take(i) {
+            let (mut pairs, mut off) = (0, 0);
+            for row in 0..a.len() {
+                each_pair(a, b, row, |_, [x, dx], [y, dy]| {
+                    pairs += 1;
+                    off += usize::from((x - y).abs() > dx + dy + 1e-12);
+                });
+            }
+            assert!(100 * off <= pairs, "{} and {}: {off} of {pairs}", names[i], names[j]);
+        }
+    }
+}

@@ -202,7 +202,8 @@ fn make(
             by_rays(rays, problem, progress)
         }
         Contender::Method(method) => {
-            let factors = FormFactors::new(method, &problem.enclosure, &Contender::options(setting, problem.memory), progress)?;
+            let factors =
+                FormFactors::new(method, &problem.enclosure, &Contender::options(setting, problem.memory), progress)?;
             let bytes = factors.starts.len() * size_of::<usize>()
                 + factors.values.len() * (size_of::<f64>() + size_of::<u32>() + size_of::<f32>());
             Ok((factors, None, bytes))
