@@ -103,14 +103,14 @@ fn corners(all: &Comparison) -> Option<[String; 2]> {
     let single = |t: &&Trial| t.method == "hemicube" && !t.label.contains("points");
     let trial = all.trials.iter().rfind(single).unwrap_or(trial);
     let first = all.trials.iter().find(single).unwrap_or(trial);
-    let [near, pairs] = trial.wrong.causes.near;
+    let [near, pairs, of_factors] = trial.wrong.causes.near;
     let mut text =
         "It looks out from the centre of an element. A facet nearer than the element is wide looks different from \
-                    there than from the element’s other places, and no number of cells mends that: "
+                    there than from the element’s other places, and no number of cells mends that. "
             .to_owned();
     if first.label != trial.label {
         text += &format!(
-            "from {} to {} the error of its factors only goes from {} to {}. ",
+            "From {} to {} the error of its factors only goes from {} to {}. ",
             escape(&first.label),
             escape(&trial.label),
             percent(first.factor_error),
@@ -118,9 +118,10 @@ fn corners(all: &Comparison) -> Option<[String; 2]> {
         );
     }
     text += &format!(
-        "Seen with {} such pairs, {} of all, make {} of the squared error of its light.",
+        "Seen with {}, such pairs, {} of all, make {} of the squared error of its factors and {} of that of its light.",
         escape(&trial.label),
         percent(pairs),
+        percent(of_factors),
         percent(near)
     );
     let spread = all.trials.iter().find(|t| t.method == "hemicube" && t.label.contains("points"));

@@ -228,7 +228,7 @@ pub fn causes(all: &Comparison) -> String {
 /// What is to be said of a method, from its numbers.
 fn said(t: &Trial) -> String {
     let w = &t.wrong;
-    let (cause, [part, pairs]) = w.causes.ranked()[0];
+    let (cause, [part, pairs, _]) = w.causes.ranked()[0];
     let cells = if t.kind == Kind::Sampling { "rays" } else { "cells" };
     let what = match (cause, t.kind) {
         ("near", _) => {

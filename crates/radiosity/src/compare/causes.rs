@@ -19,24 +19,24 @@ const FEW: f64 = 32.0;
 /// Light against the mean that relative differences are relative to at least.
 const DARK: f64 = 0.01;
 
-/// Shares of the squared error, and of the pairs.
+/// Shares of the squared error of light, of the pairs, and of the squared error of factors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Causes {
     /// Below the rim of the projection surface.
-    pub rim: [f64; 2],
+    pub rim: [f64; 3],
     /// Nearer than the receiver is wide.
-    pub near: [f64; 2],
+    pub near: [f64; 3],
     /// Something stands between.
-    pub hidden: [f64; 2],
+    pub hidden: [f64; 3],
     /// Fewer than 32 cells or rays.
-    pub small: [f64; 2],
+    pub small: [f64; 3],
     /// None of these.
-    pub rest: [f64; 2],
+    pub rest: [f64; 3],
 }
 
 impl Causes {
-    /// Name, share of the squared error, share of the pairs; the largest first.
-    pub fn ranked(&self) -> [(&'static str, [f64; 2]); 5] {
+    /// Name and shares; the largest of the error of light first.
+    pub fn ranked(&self) -> [(&'static str, [f64; 3]); 5] {
         let mut all = [
             ("rim", self.rim),
             ("near", self.near),
@@ -82,16 +82,16 @@ pub(super) fn wrong(
 ) -> Wrong {
     let exact = &reference.factors;
     let light: Vec<f64> = (0..problem.len()).map(|j| luminous(&reference.radiosity, j)).collect();
-    let sums: Vec<[[f64; 2]; 5]> =
+    let sums: Vec<[[f64; 3]; 5]> =
         (0..problem.len()).into_par_iter().map(|i| shares(i, factors, samples, (problem, reference), &light)).collect();
-    let mut total = [[0.0; 2]; 5];
+    let mut total = [[0.0; 3]; 5];
     for row in &sums {
         for (total, row) in total.iter_mut().zip(row) {
-            (0..2).for_each(|k| total[k] += row[k]);
+            (0..3).for_each(|k| total[k] += row[k]);
         }
     }
-    let all = [0, 1].map(|k| total.iter().map(|cause| cause[k]).sum::<f64>().max(f64::MIN_POSITIVE));
-    let [rim, near, hidden, small, rest] = total.map(|cause| [cause[0] / all[0], cause[1] / all[1]]);
+    let all = [0, 1, 2].map(|k| total.iter().map(|cause| cause[k]).sum::<f64>().max(f64::MIN_POSITIVE));
+    let [rim, near, hidden, small, rest] = total.map(|cause| [0, 1, 2].map(|k| cause[k] / all[k]));
 
     // The worst element, and what it gets wrong most light from.
     let off = |i: usize| bright(irradiance[i]) - bright(reference.irradiance[i]);
@@ -143,20 +143,20 @@ fn to_segment(point: DVec3, a: DVec3, b: DVec3) -> f64 {
     point.distance(a + along * (b - a))
 }
 
-/// Squared error and number of pairs of row i by cause.
+/// Squared error of light, number of pairs and squared error of factors of row i by cause.
 fn shares(
     i: usize,
     factors: &FormFactors,
     samples: Option<usize>,
     (problem, reference): (&Problem, &Reference),
     light: &[f64],
-) -> [[f64; 2]; 5] {
+) -> [[f64; 3]; 5] {
     let facets = &problem.enclosure.facets;
     let (normal, centre) = (facets[i].normal(), facets[i].centroid());
     // sin² of the height of a round rim that captures as much.
     let rim = 1.0 - factors.captured.get(i).copied().unwrap_or(1.0);
     let cut = 10.0 * 1e-4 * reference.account.accuracy;
-    let mut sums = [[0.0; 2]; 5];
+    let mut sums = [[0.0; 3]; 5];
     each_pair(factors, &reference.factors, i, |j, [value, _], [truth, own]| {
         let towards = (facets[j].centroid() - centre).normalize_or_zero();
         let is_low = rim > 1e-3 && towards.dot(normal).powi(2) < rim;
@@ -173,6 +173,7 @@ fn shares(
         };
         sums[cause][0] += problem.area[i] * ((value - truth) * light[j]).powi(2);
         sums[cause][1] += 1.0;
+        sums[cause][2] += (value - truth).powi(2);
     });
     sums
 }

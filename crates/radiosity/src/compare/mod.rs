@@ -48,6 +48,8 @@ pub struct CompareOptions {
     pub methods: Vec<Contender>,
     /// Solvers.
     pub solvers: Vec<Solver>,
+    /// The tightest accuracy that the reference is asked for, if there is time.
+    pub accuracy: f64,
     /// Wall-clock seconds for all; what has begun is finished.
     pub seconds: f64,
     /// Bytes that factors may take.
@@ -66,6 +68,7 @@ impl Default for CompareOptions {
             elements: 1000,
             methods: Contender::all().collect(),
             solvers: Solver::ALL.to_vec(),
+            accuracy: 1e-6,
             seconds: 60.0,
             memory: 4 << 30,
             audit: (2000, 256),
@@ -123,10 +126,13 @@ pub struct Comparison {
 /// third is kept for growth.
 const REFERENCE: f64 = 0.25;
 const SOLVERS: f64 = 0.15;
-const GROWTH: f64 = 0.2;
+const GROWTH: f64 = 0.15;
 
 /// How much of the time that is left for methods one run may take, at most: a third leaves room for the others.
 const ONE_RUN: f64 = 0.35;
+
+/// The pass in which pairs run: after two settings of rows.
+const PAIRS_TURN: usize = 2;
 
 /// Meshes for growth, against the one of all, beside it.
 const MESHES: [f64; 3] = [0.25, 0.5, 2.0];
@@ -151,7 +157,7 @@ pub fn compare(tracer: &Tracer, options: &CompareOptions, monitor: &dyn Monitor)
     monitor.stage("elements");
     let problem = Problem::new(tracer, options.elements, options.memory, monitor)?;
     monitor.stage("reference");
-    let reference = Reference::new(&problem, REFERENCE * options.seconds, monitor)?;
+    let reference = Reference::new(&problem, (options.accuracy, REFERENCE * options.seconds), monitor)?;
     monitor.stage("engine");
     let (points, paths) = options.audit;
     let asked = (points, paths, options.seed, options.memory);
@@ -229,10 +235,17 @@ fn run(
     let mut trials: Vec<(usize, Trial)> = Vec::new();
     let mut skipped = Vec::new();
     let mut is_out = vec![false; options.methods.len()];
-    let passes = options.methods.iter().map(|contender| contender.settings().len()).max().unwrap_or(0);
+    // Pairs have one setting, and most cost so much that rows go before them.
+    let turn = |contender: &Contender| if contender.kind() == Kind::Pair { PAIRS_TURN } else { 0 };
+    let last = |contender: &Contender| turn(contender) + contender.settings().len();
+    let passes = options.methods.iter().map(last).max().unwrap_or(0);
+    let setting = |contender: &Contender, pass: usize| {
+        let place = pass.checked_sub(turn(contender))?;
+        contender.settings().get(place).copied()
+    };
     for pass in 0..passes {
         for (place, contender) in options.methods.iter().enumerate() {
-            let Some(setting) = contender.settings().get(pass).copied().filter(|_| !is_out[place]) else { continue };
+            let Some(setting) = setting(contender, pass).filter(|_| !is_out[place]) else { continue };
             // As exact as the reference, it would be compared with itself.
             if matches!(setting, Setting::Accuracy(bound) if bound <= reference.account.accuracy) {
                 continue;

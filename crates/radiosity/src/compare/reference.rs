@@ -58,14 +58,14 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Of a problem; its factors are as exact as can be had within some `seconds`.
-    pub fn new(problem: &Problem, seconds: f64, monitor: &dyn Monitor) -> Result<Reference, Error> {
+    /// Of a problem; its factors are as exact as asked, or as can be had within some `seconds`.
+    pub fn new(problem: &Problem, (tightest, seconds): (f64, f64), monitor: &dyn Monitor) -> Result<Reference, Error> {
         let begun = Instant::now();
         let mut found: Option<Reference> = None;
         let (mut before, mut last) = (0.0, 0.0);
         for accuracy in ACCURACIES {
             // What was given up half-way would be time lost; so the next is begun only if it will end.
-            if before + last + LONGER * last > seconds && found.is_some() {
+            if found.is_some() && (accuracy < tightest || before + last + LONGER * last > seconds) {
                 break;
             }
             let next = Reference::at(accuracy, problem, monitor)?;

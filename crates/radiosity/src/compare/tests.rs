@@ -13,11 +13,12 @@ const AMPLE: f64 = 1e6;
 
 fn options(methods: &[&str], solvers: &[Solver]) -> CompareOptions {
     CompareOptions {
-        elements: 80,
+        elements: 48,
         methods: methods.iter().map(|name| name.parse().unwrap()).collect(),
         solvers: solvers.to_vec(),
+        accuracy: 1e-4,
         seconds: AMPLE,
-        audit: (200, 16),
+        audit: (100, 16),
         side: 48,
         ..CompareOptions::default()
     }
@@ -149,8 +150,9 @@ fn room_with_plate() -> Scene {
 }
 
 /// Whatever surface is projected on, and however pairs are integrated, factors are the same within the sum of what the
-/// methods state as their errors, past something that stands between. Three standard errors and doubts that rest on what was seen
-/// are no proof: one pair in a hundred may be off by more.
+/// methods state as their errors, past something that stands between. But three standard errors are no proof, and what no eye
+/// point saw of a facet is not in its doubts: one pair in fifty may be off by more, one in twenty with the single plane,
+/// which does not doubt what hides below its rim.
 #[test]
 fn catalogue_91_all_methods_agree_within_their_stated_errors() {
     let scene = room_with_plate();
@@ -176,14 +178,16 @@ fn catalogue_91_all_methods_agree_within_their_stated_errors() {
     });
     for (i, a) in factors.iter().enumerate() {
         for (j, b) in factors.iter().enumerate().take(i) {
-            let (mut pairs, mut off) = (0, 0);
+            let (mut pairs, mut off) = (0u32, 0u32);
             for row in 0..a.len() {
                 each_pair(a, b, row, |_, [x, dx], [y, dy]| {
                     pairs += 1;
-                    off += usize::from((x - y).abs() > dx + dy + 1e-12);
+                    off += u32::from((x - y).abs() > dx + dy + 1e-12);
                 });
             }
-            assert!(100 * off <= pairs, "{} and {}: {off} of {pairs}", names[i], names[j]);
+            let allowed = if [names[i], names[j]].contains(&"single-plane") { 0.05 } else { 0.02 };
+            let share = f64::from(off) / f64::from(pairs);
+            assert!(share <= allowed, "{} and {}: {off} of {pairs}", names[i], names[j]);
         }
     }
 }
