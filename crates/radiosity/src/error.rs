@@ -48,9 +48,6 @@ pub enum Error {
     /// A page of a lightmap cannot be encoded.
     #[error("page of a lightmap: {0}")]
     Picture(#[from] radiosity_io::image_out::EncodeError),
-    /// An element is no polygon.
-    #[error("{0}; leave such slivers out of the scene, or use another --ff")]
-    Element(radiosity_scene::ElementError),
     /// Form factors do not fit into the memory allowed.
     #[error("{0}")]
     Factors(radiosity_transport::FactorError),

@@ -10,7 +10,7 @@ use super::adaptive::integrate;
 use super::clear::Exchange;
 use super::panel::Panel;
 use super::part::Part;
-use super::solid::looks_away;
+use super::solid::{Obstacles, looks_away};
 use super::visible::{Loop, Shadows, keep_above};
 use radiosity_scene::Facet;
 
@@ -21,7 +21,7 @@ const INSIDE: f64 = 1e-7;
 pub fn mixed(
     shadows: &mut Shadows,
     [a, b]: [&Part; 2],
-    (panels, (all, solids)): (&mut Vec<&Panel>, (&[Panel], &[Vec<u32>])),
+    (panels, obstacles): (&mut Vec<&Panel>, Obstacles),
     whole: Exchange,
     tolerance: f64,
     touch: f64,
@@ -38,7 +38,7 @@ pub fn mixed(
     let Ok(from) = Facet::new(from.to_vec()) else { return Exchange::default() };
     let normal = outer.shape.normal();
 
-    panels.retain(|panel| !looks_away(panel, solids, all, from.corners(), touch));
+    panels.retain(|panel| !looks_away(panel, obstacles, from.corners(), touch));
     let middle = from.centroid();
     Shadows::sort(middle, normal, &target, panels, touch);
     let found = integrate(&from, tolerance, |x| {

@@ -30,7 +30,7 @@ use radiosity_scene::Enclosure;
 use rayon::prelude::*;
 use serde::Serialize;
 use shaft::{Look, Stands, stands};
-use solid::find_solids;
+use solid::{Obstacles, find_solids};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use store::Entry;
 use visible::Shadows;
@@ -275,8 +275,8 @@ impl Walk<'_> {
             whole
         } else {
             self.choices.clipped += 1;
-            let scene = (self.panels, self.solids);
-            mixed(&mut self.shadows, [a, b], (&mut panels, scene), whole, self.options.accuracy * least, self.touch)
+            let obstacles = Obstacles { panels: self.panels, solids: self.solids };
+            mixed(&mut self.shadows, [a, b], (&mut panels, obstacles), whole, self.options.accuracy * least, self.touch)
         };
         if exchange.value > 0.0 || exchange.error > 0.0 {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));

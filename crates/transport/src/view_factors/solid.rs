@@ -7,6 +7,15 @@ use super::panel::Panel;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
+/// The panels of a scene and its solids.
+#[derive(Clone, Copy)]
+pub struct Obstacles<'a> {
+    /// All panels.
+    pub panels: &'a [Panel],
+    /// The faces of each solid.
+    pub solids: &'a [Vec<u32>],
+}
+
 /// Marks the panels that are faces of convex solids; answers with the faces of each.
 pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Vec<u32>> {
     // Corners within some roundings of each other are one; where a border of the grid parts them, a solid is overlooked.
@@ -62,10 +71,10 @@ pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Vec<u32>> {
 const MOST_FACES: usize = 32;
 
 /// Whether a solid's panel can be left out as seen from the places `from`: it looks away from them, and they lie outside.
-pub fn looks_away(panel: &Panel, solids: &[Vec<u32>], panels: &[Panel], from: &[DVec3], touch: f64) -> bool {
+pub fn looks_away(panel: &Panel, obstacles: Obstacles, from: &[DVec3], touch: f64) -> bool {
     let Some(solid) = panel.solid else { return false };
-    from.iter().all(|x| panel.height(*x) <= touch)
-        && solids[solid as usize].iter().any(|face| from.iter().all(|x| panels[*face as usize].height(*x) >= -touch))
+    let is_before = |face: &u32| from.iter().all(|x| obstacles.panels[*face as usize].height(*x) >= -touch);
+    from.iter().all(|x| panel.height(*x) <= touch) && obstacles.solids[solid as usize].iter().any(is_before)
 }
 
 #[cfg(test)]
@@ -93,7 +102,8 @@ mod tests {
         let mut panels = cube(true);
         let solids = find_solids(&mut panels, 1e-7);
         assert_eq!(solids.len(), 1);
-        let away = |x: DVec3| panels.iter().filter(|p| looks_away(p, &solids, &panels, &[x], 1e-7)).count();
+        let obstacles = Obstacles { panels: &panels, solids: &solids };
+        let away = |x: DVec3| panels.iter().filter(|p| looks_away(p, obstacles, &[x], 1e-7)).count();
         assert_eq!(away(DVec3::new(3.0, 4.0, 5.0)), 3);
         assert_eq!(away(DVec3::new(0.5, 0.5, 5.0)), 5);
         assert_eq!(away(DVec3::splat(0.5)), 0);
