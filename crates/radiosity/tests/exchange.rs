@@ -110,7 +110,7 @@ fn catalogue_7_boxes_of_constant_elements() {
 }
 
 /// Mean radiosities of two surfaces that face each other, for each n in turn, must come nearer to the integral equation's
-/// with each doubling, and in the end to `digits`.
+/// with each doubling until a tenth of `digits`, and in the end to `digits`.
 fn check_refinement(id: &str, steps: &[usize], digits: f64, make: impl Fn(&Value, usize) -> Enclosure) {
     let case = case("cases", id);
     let given = |key: &str| numbers(&case["given"][key]);
@@ -124,7 +124,7 @@ fn check_refinement(id: &str, steps: &[usize], digits: f64, make: impl Fn(&Value
         let b = radiosity(&found, &all(given("exitance")), all(given("reflectance")));
         let off =
             means(&b, &found.areas, half).iter().zip(&exact).map(|(b, x)| (b / x - 1.0).abs()).fold(0.0, f64::max);
-        assert!(off < 0.5 * last, "{id}, {n}: {off} after {last}");
+        assert!(off < 0.5 * last || off < 0.1 * digits, "{id}, {n}: {off} after {last}");
         last = off;
     }
     assert!(last < digits, "{id}: {last}");
@@ -151,7 +151,7 @@ const LONG: f64 = 4000.0;
 #[test]
 fn catalogue_3_facing_strips() {
     for id in ["rad-2d-plates-1", "rad-2d-plates-2"] {
-        check_refinement(id, &[2, 4, 8, 16], 1e-3, |given, n| {
+        check_refinement(id, &[4, 8, 16, 32], 1e-3, |given, n| {
             let (gap, along) = (DVec3::Z * given["gap"].as_f64().unwrap(), DVec3::Y * LONG);
             let mut pair = Enclosure::default();
             add(&mut pair, [DVec3::ZERO, DVec3::X, along], [n, 1], gap);
@@ -166,7 +166,7 @@ fn catalogue_3_facing_strips() {
 fn catalogue_3_coaxial_discs() {
     const SIDES: usize = 32;
     for id in ["rad-coaxial-disks-1", "rad-coaxial-disks-2"] {
-        check_refinement(id, &[1, 2, 4], 5e-3, |given, n| {
+        check_refinement(id, &[1, 2, 4, 8], 3e-3, |given, n| {
             let (radii, gap) = (numbers(&given["radius"]), given["gap"].as_f64().unwrap());
             let step = TAU / SIDES as f64;
             let mut pair = Enclosure::default();

@@ -282,7 +282,7 @@ impl Scene {
         }
         for material in &self.materials {
             let place = format!("{place}: material '{}'", material.name);
-            if material.base_color.iter().any(|c| !c.is_finite() || *c < 0.0) {
+            if material.base_color.iter().any(|c| !(0.0..=1.0).contains(c)) {
                 faults.error(&place, format!("base colour {:?}", material.base_color), "use values in 0..1");
             }
             if material.emissive.iter().any(|e| !e.is_finite() || *e < 0.0) {

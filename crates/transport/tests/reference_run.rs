@@ -12,13 +12,20 @@ const N: usize = 12;
 fn cube() -> Enclosure {
     let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z];
     let mut cube = Enclosure { is_closed: true, ..Enclosure::default() };
-    for [corner, u, v] in
-        [[DVec3::ZERO, x, y], [z, y, x], [DVec3::ZERO, y, z], [x, z, y], [DVec3::ZERO, z, x], [y, x, z]]
-    {
+    // In this order, and patches along u before those along v, shots in turn are the published ones.
+    for [corner, u, v, inwards] in [
+        [DVec3::ZERO, x, y, z],
+        [z, x, y, -z],
+        [DVec3::ZERO, y, z, x],
+        [x, y, z, -x],
+        [DVec3::ZERO, x, z, y],
+        [y, x, z, -y],
+    ] {
         for k in 0..N * N {
             let (u, v) = (u / N as f64, v / N as f64);
-            let at = corner + u * (k % N) as f64 + v * (k / N) as f64;
-            cube.add("patch", Facet::new(vec![at, at + u, at + u + v, at + v]).unwrap());
+            let at = corner + u * (k / N) as f64 + v * (k % N) as f64;
+            let patch = Facet::new(vec![at, at + u, at + u + v, at + v]).unwrap();
+            cube.add("patch", if patch.normal().dot(inwards) > 0.0 { patch } else { patch.flipped() });
         }
     }
     cube
