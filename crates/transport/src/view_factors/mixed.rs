@@ -6,12 +6,15 @@
 //! panels, by its own size, is divided: what stands close to a part throws sharp shadows there, which only the exact
 //! side resolves.
 
-use super::adaptive::integrate;
+use super::adaptive::{Before, List, Shaded, integrate};
 use super::clear::Exchange;
 use super::panel::Panel;
 use super::part::Part;
-use super::solid::{Obstacles, looks_away};
-use super::visible::{Loop, Shadows, keep_above};
+use super::shaft::{Look, Shaft, Stands};
+use super::solid::{Obstacles, hides, looks_away};
+use super::visible::{Loop, Shadows, Sight, keep_above, lambert};
+use crate::pair::exact::exact;
+use glam::DVec3;
 use radiosity_scene::Facet;
 
 /// Places are drawn this much towards the middle: on an edge that both parts share, a factor has no one value.
@@ -26,7 +29,7 @@ pub fn mixed(
     tolerance: f64,
     touch: f64,
 ) -> Exchange {
-    let (outer, inner) = if distance(a, b, panels, touch) >= distance(b, a, panels, touch) { (a, b) } else { (b, a) };
+    let (outer, inner) = if distance(a, panels) >= distance(b, panels) { (a, b) } else { (b, a) };
     let above = |part: &Part, other: &Part| {
         let mut left: Loop = part.shape.corners().iter().copied().collect();
         let normal = other.shape.normal();
@@ -35,16 +38,16 @@ pub fn mixed(
     let (Some(from), Some(target)) = (above(outer, inner), above(inner, outer)) else {
         return Exchange::default();
     };
-    let Ok(from) = Facet::new(from.to_vec()) else { return Exchange::default() };
-    let normal = outer.shape.normal();
-
+    let (Ok(from), Ok(to)) = (Facet::new(from.to_vec()), Facet::new(target.to_vec())) else {
+        return Exchange::default();
+    };
     panels.retain(|panel| !looks_away(panel, obstacles, from.corners(), touch));
     let middle = from.centroid();
-    Shadows::sort(middle, normal, &target, panels, touch);
-    let found = integrate(&from, tolerance, |x| {
-        let x = x + INSIDE * (middle - x);
-        shadows.factor(x, normal, &target, panels, touch)
-    });
+    Shadows::sort(middle, outer.shape.normal(), &target, panels, touch);
+    let all: List = (0..panels.len().min(usize::from(u16::MAX)) as u16).collect();
+    let mut view =
+        View { shadows, panels, obstacles, middle, normal: outer.shape.normal(), target: &target, to: &to, touch };
+    let found = integrate(&from, (whole.value, tolerance), &mut view, &all);
     // What is visible, or what all would be without what is hidden: whichever is known better.
     let [(visible, of_visible), (hidden, of_hidden)] = [0, 1].map(|k| (found.values[k], found.errors[k]));
     let (value, error) = if of_visible <= of_hidden + whole.error {
@@ -55,16 +58,75 @@ pub fn mixed(
     Exchange { value: value.clamp(0.0, whole.value), error }
 }
 
-/// How far the nearest panel stands from a part on the way to another, by the part's size.
-fn distance(part: &Part, other: &Part, panels: &[&Panel], touch: f64) -> f64 {
-    let (p, q) = (part.shape.centroid(), other.shape.centroid());
-    let share = |panel: &&Panel| {
-        let through = |part: &Part| {
-            let heights = part.shape.corners().iter().map(|c| panel.height(*c));
-            heights.clone().any(|h| h > touch) && heights.clone().any(|h| h < -touch)
-        };
-        let (h, k) = (panel.height(p), panel.height(q));
-        if through(part) || h == k { 0.0 } else { (h / (h - k)).clamp(0.0, 1.0) }
-    };
-    panels.iter().map(share).fold(1.0, f64::min) / part.radius
+/// How far the nearest panel stands from a part, by the part's size.
+fn distance(part: &Part, panels: &[&Panel]) -> f64 {
+    let centre = part.shape.centroid();
+    panels.iter().map(|panel| panel.distance(centre)).fold(f64::INFINITY, f64::min) / part.radius
+}
+
+/// What a part sees of another past panels.
+struct View<'a> {
+    shadows: &'a mut Shadows,
+    panels: &'a [&'a Panel],
+    obstacles: Obstacles<'a>,
+    /// Where from.
+    middle: DVec3,
+    normal: DVec3,
+    /// Where to.
+    target: &'a [DVec3],
+    to: &'a Facet,
+    touch: f64,
+}
+
+impl View<'_> {
+    fn shaft<'a>(&'a self, cell: &'a [DVec3]) -> Shaft<'a> {
+        Shaft::new([cell, self.target], [self.normal, self.to.normal()], self.touch)
+    }
+}
+
+impl Shaded for View<'_> {
+    fn sight(&mut self, x: DVec3, list: &[u16]) -> Sight {
+        let x = x + INSIDE * (self.middle - x);
+        self.shadows.sight((x, self.normal), self.target, (self.panels, list), self.touch)
+    }
+
+    fn before(&mut self, cell: &[DVec3], list: &[u16]) -> Before {
+        let mut left = List::new();
+        let mut shaft = self.shaft(cell);
+        for &k in list {
+            match shaft.stands(self.panels[k as usize], Look::Close) {
+                Stands::Aside => {}
+                Stands::Between => left.push(k),
+                Stands::Across => return Before::All,
+            }
+        }
+        if left.is_empty() { Before::Nothing } else { Before::Some(left) }
+    }
+
+    fn is_hidden(&mut self, cell: &[DVec3], list: &[u16]) -> bool {
+        let mut solids: Vec<u32> = list.iter().filter_map(|k| self.panels[*k as usize].solid).collect();
+        solids.dedup();
+        solids.into_iter().any(|solid| hides(self.obstacles, solid, [cell, self.target]))
+    }
+
+    fn possible(&mut self, cell: &[DVec3], list: &[u16]) -> f64 {
+        let centre = cell.iter().sum::<DVec3>() / cell.len() as f64;
+        let mut shaft = self.shaft(cell);
+        let mut sum = 0.0;
+        for &k in list {
+            let panel = self.panels[k as usize];
+            let mut part = shaft.part_of(panel);
+            if panel.height(centre) < 0.0 {
+                part.reverse();
+            }
+            if part.len() >= 3 {
+                sum += lambert(centre, self.normal, &part);
+            }
+        }
+        sum
+    }
+
+    fn whole(&mut self, cell: &[DVec3]) -> f64 {
+        Facet::new(cell.to_vec()).map_or(0.0, |cell| exact(&cell, self.to))
+    }
 }

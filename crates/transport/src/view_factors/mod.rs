@@ -26,10 +26,10 @@ use cluster::Clusters;
 use mixed::mixed;
 use panel::{Panel, Planes, panels};
 use part::Part;
-use radiosity_scene::Enclosure;
+use radiosity_scene::{Enclosure, Facet};
 use rayon::prelude::*;
 use serde::Serialize;
-use shaft::{Look, Stands, stands};
+use shaft::{Look, Shaft, Stands};
 use solid::{Obstacles, find_solids};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use store::Entry;
@@ -38,7 +38,8 @@ use visible::Shadows;
 /// How exact the factors are to be, and what they may take.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFactorOptions {
-    /// Bound of the error of each F_ij between facets that see each other partly.
+    /// Bound of the error of each F_ij between surfaces that see each other partly; of surfaces of many facets a bound of
+    /// what those are asked for.
     pub accuracy: f64,
     /// The same for those that see each other whole.
     pub clear_accuracy: f64,
@@ -119,6 +120,9 @@ const TOUCH: f64 = 5e-7;
 /// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
 const WHOLE: f64 = 0.05;
 
+/// Least share of the accuracy that a pair of facets is asked for, where surfaces have many: their errors hardly add up.
+const LEAST: f64 = 0.1;
+
 /// Bytes that a pair takes at most, while it is found and put in order.
 const BYTES: usize = 2 * size_of::<Entry>();
 
@@ -145,9 +149,12 @@ pub fn view_factors(
     let clusters = Clusters::new(parts, &mut planes);
     let blocks = clusters.blocks(BLOCK);
     let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let of_surfaces = enclosure.surface_areas();
     let too_much = FactorError::Memory { facets: enclosure.facets.len(), allowed: options.memory };
     let work = |block: &u32| {
         let mut walk = Walk {
+            enclosure,
+            areas: &of_surfaces,
             clusters: &clusters,
             panels: &panels,
             solids: &solids,
@@ -176,6 +183,9 @@ pub fn view_factors(
 
 /// One block of parts on its way through the tree.
 struct Walk<'a> {
+    enclosure: &'a Enclosure,
+    /// Areas of the surfaces, m².
+    areas: &'a [f64],
     clusters: &'a Clusters,
     panels: &'a [Panel],
     solids: &'a [Vec<u32>],
@@ -203,12 +213,13 @@ impl Walk<'_> {
             return;
         }
         let mut left: Vec<u32> = Vec::with_capacity(between.len());
+        let mut shaft = Shaft::new([&from.hull, &to.hull], [glam::DVec3::ZERO; 2], self.touch);
         for &panel in between {
             let corners = &self.panels[panel as usize];
             if behind(&from.plane, &corners.corners) || behind(&to.plane, &corners.corners) {
                 continue;
             }
-            match stands(corners, &from.hull, &to.hull, self.touch, Look::Rough) {
+            match shaft.stands(corners, Look::Rough) {
                 Stands::Aside => {}
                 Stands::Between => left.push(panel),
                 Stands::Across => {
@@ -235,6 +246,15 @@ impl Walk<'_> {
         }
     }
 
+    /// Error of A_i F_ij that two parts may have: their share of what their surfaces may, m².
+    fn tolerance(&self, a: &Part, b: &Part) -> f64 {
+        let (area, other) = (a.shape.area(), b.shape.area());
+        let [i, j] = [a, b].map(|part| self.enclosure.surface_of[part.facet as usize]);
+        let of_surface = self.areas[i as usize].max(self.areas[j as usize]);
+        let times = if i == j { 2.0 } else { 1.0 };
+        self.options.accuracy * (area * other / (times * of_surface)).max(LEAST * area.min(other))
+    }
+
     fn pair(&mut self, i: usize, j: usize, between: &[u32]) {
         let (a, b) = (&self.clusters.parts[i], &self.clusters.parts[j]);
         let reach = |part: &Part, other: &Part| {
@@ -248,13 +268,15 @@ impl Walk<'_> {
         }
         let cut = low_a < -self.touch || low_b < -self.touch;
         let mut panels: Vec<&Panel> = Vec::new();
+        let ends = [&a.shape, &b.shape];
+        let mut shaft = Shaft::new(ends.map(Facet::corners), ends.map(Facet::normal), self.touch);
         for &panel in between {
             let panel = &self.panels[panel as usize];
             let behind = |part: &Part| panel.corners.iter().all(|c| part.shape.height(*c) <= self.touch);
             if behind(a) || behind(b) {
                 continue;
             }
-            match stands(panel, a.shape.corners(), b.shape.corners(), self.touch, Look::Close) {
+            match shaft.stands(panel, Look::Close) {
                 Stands::Aside => {}
                 Stands::Between => panels.push(panel),
                 Stands::Across => {
@@ -264,9 +286,10 @@ impl Walk<'_> {
             }
         }
         let least = a.shape.area().min(b.shape.area());
-        // Past panels the whole is asked for no more exactly than what is left of it.
-        let accuracy = if panels.is_empty() { self.options.clear_accuracy } else { WHOLE * self.options.accuracy };
-        let (whole, order) = clear(a, b, accuracy * least, cut);
+        let tolerance = self.tolerance(a, b);
+        // Past panels the whole is asked for little more exactly than what is left of it.
+        let of_whole = if panels.is_empty() { self.options.clear_accuracy * least } else { WHOLE * tolerance };
+        let (whole, order) = clear(a, b, of_whole, cut);
         let exchange = if panels.is_empty() {
             match order {
                 0 => self.choices.clear_closed_form += 1,
@@ -276,7 +299,8 @@ impl Walk<'_> {
         } else {
             self.choices.clipped += 1;
             let obstacles = Obstacles { panels: self.panels, solids: self.solids };
-            mixed(&mut self.shadows, [a, b], (&mut panels, obstacles), whole, self.options.accuracy * least, self.touch)
+            let tolerance = tolerance - whole.error;
+            mixed(&mut self.shadows, [a, b], (&mut panels, obstacles), whole, tolerance, self.touch)
         };
         if exchange.value > 0.0 || exchange.error > 0.0 {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));

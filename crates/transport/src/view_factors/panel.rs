@@ -20,10 +20,8 @@ pub struct Panel {
     pub normal: DVec3,
     /// n · x of the points x of its plane.
     pub offset: f64,
-    /// Axes of the plane.
-    axes: [DVec3; 2],
-    /// The corners along the axes.
-    outline: Vec<DVec2>,
+    /// Planes through its edges, upright on its own: unit normals inwards, and offsets.
+    pub rims: Vec<(DVec3, f64)>,
     /// The convex solid that it is a face of, normals outwards.
     pub solid: Option<u32>,
 }
@@ -31,20 +29,26 @@ pub struct Panel {
 impl Panel {
     /// The panel with these corners, counter-clockwise about `normal`.
     pub fn new(corners: Vec<DVec3>, normal: DVec3) -> Panel {
-        let (x, y) = normal.any_orthonormal_pair();
-        let outline = corners.iter().map(|c| DVec2::new(x.dot(*c), y.dot(*c))).collect();
-        Panel { offset: normal.dot(corners[0]), normal, axes: [x, y], outline, corners, solid: None }
+        let rim = |(i, a): (usize, &DVec3)| {
+            let inwards = normal.cross(corners[(i + 1) % corners.len()] - *a).normalize_or_zero();
+            (inwards, inwards.dot(*a))
+        };
+        let rims = corners.iter().enumerate().map(rim).collect();
+        Panel { offset: normal.dot(corners[0]), normal, rims, corners, solid: None }
     }
 
-    /// A point along the axes of the plane.
-    #[inline]
-    pub fn flat(&self, point: DVec3) -> DVec2 {
-        DVec2::new(self.axes[0].dot(point), self.axes[1].dot(point))
-    }
-
-    /// The corners along the axes of the plane.
-    pub fn outline(&self) -> &[DVec2] {
-        &self.outline
+    /// Distance of a point from the panel, m.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        if self.rims.iter().all(|(inwards, offset)| inwards.dot(point) >= *offset) {
+            return self.height(point).abs();
+        }
+        let n = self.corners.len();
+        let beside = |i: usize| {
+            let (a, edge) = (self.corners[i], self.corners[(i + 1) % n] - self.corners[i]);
+            let along = ((point - a).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+            point.distance(a + along * edge)
+        };
+        (0..n).map(beside).fold(f64::INFINITY, f64::min)
     }
 
     /// Height of a point above the plane.

@@ -5,7 +5,8 @@
 //! blocked; if it lies within the panel and the sets lie on either side, everything is. Both are proofs.
 
 use super::panel::Panel;
-use glam::{DVec2, DVec3};
+use super::visible::{Loop, keep_above};
+use glam::DVec3;
 use smallvec::SmallVec;
 
 /// What a panel does to the light between two sets.
@@ -24,100 +25,155 @@ pub enum Stands {
 pub enum Look {
     /// By the edges of the panel: some panels aside count as between.
     Rough,
-    /// By the edges of the hull, too.
+    /// By the sides of the hull, too. The two sets must be polygons.
     Close,
 }
 
-/// What `panel` does to segments from the hull of `from` to that of `to`. `touch` is the distance below which points
-/// count as lying on a plane.
-pub fn stands(panel: &Panel, from: &[DVec3], to: &[DVec3], touch: f64, look: Look) -> Stands {
-    let heights = |points: &[DVec3]| -> SmallVec<[f64; 8]> { points.iter().map(|p| panel.height(*p)).collect() };
-    let (a, b) = (heights(from), heights(to));
-    let side = |h: &[f64]| (h.iter().all(|h| *h >= -touch), h.iter().all(|h| *h <= touch));
-    let ((a_above, a_below), (b_above, b_below)) = (side(&a), side(&b));
-    if (a_above && b_above) || (a_below && b_below) {
-        return Stands::Aside;
-    }
+/// Corners of a polygon, mostly.
+type Few<T> = SmallVec<[T; 8]>;
 
-    // Where segments cross the plane, in its own coordinates.
-    let flat = |points: &[DVec3]| -> SmallVec<[DVec2; 8]> { points.iter().map(|p| panel.flat(*p)).collect() };
-    let (from, to) = (flat(from), flat(to));
-    let mut crossings: SmallVec<[DVec2; 64]> = SmallVec::new();
-    // Corners in the plane are met there, and a crossing next to one may get lost in rounding.
-    for (points, heights) in [(&from, &a), (&to, &b)] {
-        crossings.extend(points.iter().zip(heights).filter(|(_, h)| h.abs() <= touch).map(|(p, _)| *p));
-    }
-    let mut cross = |p: DVec2, hp: f64, q: DVec2, hq: f64| {
-        if (hp > 0.0) != (hq > 0.0) {
-            crossings.push(p + hp / (hp - hq) * (q - p));
-        }
-    };
-    for (p, hp) in from.iter().zip(&a) {
-        for (q, hq) in to.iter().zip(&b) {
-            cross(*p, *hp, *q, *hq);
-        }
-    }
-    let parted = (a_above && b_below) || (a_below && b_above);
-    if !parted {
-        for (points, heights) in [(&from, &a), (&to, &b)] {
-            for i in 0..points.len() {
-                for k in 0..i {
-                    cross(points[i], heights[i], points[k], heights[k]);
-                }
-            }
-        }
-    }
-    if crossings.is_empty() {
-        return Stands::Aside;
-    }
+/// A plane by its unit normal and n · x of its points.
+type Plane = (DVec3, f64);
 
-    let corners = panel.outline();
-    let mut all_within = true;
-    for (i, &c) in corners.iter().enumerate() {
-        let edge = corners[(i + 1) % corners.len()] - c;
-        let length = edge.length();
-        let (mut nearest, mut farthest) = (f64::INFINITY, f64::NEG_INFINITY);
-        for p in &crossings {
-            let inside = edge.perp_dot(*p - c);
-            (nearest, farthest) = (nearest.min(inside), farthest.max(inside));
-        }
-        if farthest <= touch * length {
-            return Stands::Aside;
-        }
-        all_within &= nearest >= 0.0;
-    }
-    if all_within && parted {
-        return Stands::Across;
-    }
-    let is_aside = look == Look::Close && is_parted_by_hull(&mut crossings, corners, touch);
-    if is_aside { Stands::Aside } else { Stands::Between }
+/// What lies between two convex sets.
+#[derive(Clone, Debug)]
+pub struct Shaft<'a> {
+    /// Corners of either.
+    ends: [&'a [DVec3]; 2],
+    /// Normals, if they are polygons: their corners run counter-clockwise about them.
+    normals: [DVec3; 2],
+    /// Distance below which points count as lying on a plane.
+    touch: f64,
+    /// Sides of the hull that join both, and those ends that are sides; normals outwards. Found when first asked for.
+    sides: Option<SmallVec<[Plane; 12]>>,
 }
 
-/// Whether an edge of the hull of `points` parts it from the polygon `corners`.
-fn is_parted_by_hull(points: &mut SmallVec<[DVec2; 64]>, corners: &[DVec2], touch: f64) -> bool {
-    // The hull, counter-clockwise (Andrew 1979).
-    points.sort_unstable_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)));
-    let mut hull: SmallVec<[DVec2; 32]> = SmallVec::new();
-    for pass in 0..2 {
-        let start = hull.len();
-        for k in 0..points.len() {
-            let p = points[if pass == 0 { k } else { points.len() - 1 - k }];
-            while hull.len() >= start + 2 {
-                let [a, b] = [hull[hull.len() - 2], hull[hull.len() - 1]];
-                if (b - a).perp_dot(p - a) > 0.0 {
-                    break;
-                }
-                hull.pop();
-            }
-            hull.push(p);
-        }
-        hull.pop();
+impl<'a> Shaft<'a> {
+    /// The shaft between two sets; the normals matter for polygons only.
+    pub fn new(ends: [&'a [DVec3]; 2], normals: [DVec3; 2], touch: f64) -> Shaft<'a> {
+        Shaft { ends, normals, touch, sides: None }
     }
-    (0..hull.len()).any(|i| {
-        let (a, edge) = (hull[i], hull[(i + 1) % hull.len()] - hull[i]);
-        let reach = touch * edge.length();
-        edge != DVec2::ZERO && corners.iter().all(|c| edge.perp_dot(*c - a) <= reach)
-    })
+
+    /// What `panel` does to the segments from one end to the other.
+    pub fn stands(&mut self, panel: &Panel, look: Look) -> Stands {
+        let touch = self.touch;
+        let [from, to] = self.ends;
+        let [a, b] = self.ends.map(|end| end.iter().map(|p| panel.height(*p)).collect::<Few<f64>>());
+        let side = |h: &[f64]| (h.iter().all(|h| *h >= -touch), h.iter().all(|h| *h <= touch));
+        let ((a_above, a_below), (b_above, b_below)) = (side(&a), side(&b));
+        if (a_above && b_above) || (a_below && b_below) {
+            return Stands::Aside;
+        }
+        let is_parted = (a_above && b_below) || (a_below && b_above);
+        let mut all_within = true;
+        for (inwards, offset) in &panel.rims {
+            let inside = |points: &[DVec3]| points.iter().map(|p| inwards.dot(*p) - offset).collect::<Few<f64>>();
+            let mut crossings = Crossings { touch, outside: true, within: true };
+            let (e, f) = (inside(from), inside(to));
+            crossings.between([&a, &b], [&e, &f]);
+            if !is_parted {
+                crossings.between([&a, &a], [&e, &e]);
+                crossings.between([&b, &b], [&f, &f]);
+            }
+            crossings.in_plane(&a, &e);
+            crossings.in_plane(&b, &f);
+            if crossings.outside {
+                return Stands::Aside;
+            }
+            all_within &= crossings.within;
+        }
+        if all_within && is_parted {
+            return Stands::Across;
+        }
+        let is_beside = |(outwards, offset): &Plane| panel.corners.iter().all(|c| outwards.dot(*c) - offset >= -touch);
+        let is_aside = look == Look::Close && self.sides().iter().any(is_beside);
+        if is_aside { Stands::Aside } else { Stands::Between }
+    }
+
+    /// What of a panel lies in the shaft between two polygons; empty if nothing.
+    pub fn part_of(&mut self, panel: &Panel) -> Loop {
+        let mut part: Loop = panel.corners.iter().copied().collect();
+        for (outwards, offset) in self.sides() {
+            if !keep_above(&mut part, -*outwards, -offset) {
+                return Loop::new();
+            }
+        }
+        part
+    }
+
+    fn sides(&mut self) -> &[Plane] {
+        let Shaft { ends, normals, touch, .. } = *self;
+        self.sides.get_or_insert_with(|| sides(ends, normals, touch))
+    }
+}
+
+/// Where the segments between corners cross the plane of a panel: all outside of an edge, or all within it.
+struct Crossings {
+    touch: f64,
+    outside: bool,
+    within: bool,
+}
+
+impl Crossings {
+    /// Segments between two sets of corners, by their heights above the plane and their distances within the edge.
+    fn between(&mut self, heights: [&[f64]; 2], inside: [&[f64]; 2]) {
+        for (a, e) in heights[0].iter().zip(inside[0]) {
+            for (b, f) in heights[1].iter().zip(inside[1]) {
+                if (*a > 0.0) != (*b > 0.0) {
+                    let (length, within) = if *a > 0.0 { (a - b, a * f - b * e) } else { (b - a, b * e - a * f) };
+                    self.outside &= within <= self.touch * length;
+                    self.within &= within >= 0.0;
+                }
+            }
+            if !(self.outside || self.within) {
+                return;
+            }
+        }
+    }
+
+    /// Corners in the plane are met there, and a crossing next to one may get lost in rounding.
+    fn in_plane(&mut self, heights: &[f64], inside: &[f64]) {
+        for (_, e) in heights.iter().zip(inside).filter(|(h, _)| h.abs() <= self.touch) {
+            self.outside &= *e <= self.touch;
+            self.within &= *e >= 0.0;
+        }
+    }
+}
+
+/// The sides of the hull of two polygons that join both, and those of the polygons that are sides of it.
+fn sides(ends: [&[DVec3]; 2], normals: [DVec3; 2], touch: f64) -> SmallVec<[Plane; 12]> {
+    let mut sides = SmallVec::new();
+    for (own, other, normal) in [(ends[0], ends[1], normals[0]), (ends[1], ends[0], normals[1])] {
+        let heights = other.iter().map(|q| normal.dot(*q - own[0]));
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        if low >= -touch {
+            sides.push((-normal, -normal.dot(own[0])));
+        }
+        if high <= touch {
+            sides.push((normal, normal.dot(own[0])));
+        }
+        // Seen along an edge, the polygon and what lies above it span a wedge; so do the polygon and what lies below.
+        for (turn, is_there) in [(1.0, high > touch), (-1.0, low < -touch)] {
+            if !is_there {
+                continue;
+            }
+            for (i, &p) in own.iter().enumerate() {
+                let along = turn * (own[(i + 1) % own.len()] - p);
+                let mut side = DVec3::ZERO;
+                for &q in other {
+                    if side == DVec3::ZERO || side.dot(q - p) > 0.0 {
+                        side = along.cross(q - p);
+                    }
+                }
+                let side = side.normalize_or_zero();
+                let holds = |x: &DVec3| side.dot(*x - p) <= touch;
+                if side != DVec3::ZERO && other.iter().all(holds) && own.iter().all(holds) {
+                    sides.push((side, side.dot(p)));
+                }
+            }
+        }
+    }
+    sides
 }
 
 #[cfg(test)]
@@ -134,11 +190,14 @@ mod tests {
         Panel::new(corners, normal)
     }
 
+    fn stands(panel: &Panel, a: &[DVec3], b: &[DVec3], look: Look) -> Stands {
+        Shaft::new([a, b], [DVec3::Z, DVec3::Z], 1e-7).stands(panel, look)
+    }
+
     #[test]
     fn a_panel_is_aside_between_or_across() {
         let (a, b) = (square(0., [0., 0.], [1., 1.]), square(2., [0., 0.], [1., 1.]));
-        let is =
-            |low: [f64; 2], high: [f64; 2], z: f64| stands(&panel(square(z, low, high)), &a, &b, 1e-7, Look::Close);
+        let is = |low: [f64; 2], high: [f64; 2], z: f64| stands(&panel(square(z, low, high)), &a, &b, Look::Close);
         assert_eq!(is([-0.1, -0.1], [1.1, 1.1], 1.0), Stands::Across);
         assert_eq!(is([0.0, 0.0], [1.0, 1.0], 1.0), Stands::Across);
         assert_eq!(is([0.1, 0.0], [1.0, 1.0], 1.0), Stands::Between);
@@ -153,9 +212,9 @@ mod tests {
         let (a, b) = (square(0., [0., 0.], [1., 1.]), square(2., [0., 0.], [1., 1.]));
         let p = |x: f64, y: f64| DVec3::new(x, y, 1.0);
         let aside = panel(vec![p(0.5, -0.1), p(1.1, 0.5), p(1.5, -0.5)]);
-        assert_eq!(stands(&aside, &a, &b, 1e-7, Look::Close), Stands::Between);
+        assert_eq!(stands(&aside, &a, &b, Look::Close), Stands::Between);
         let aside = panel(vec![p(0.95, -0.2), p(1.2, 0.05), p(1.5, -0.5)]);
-        assert_eq!(stands(&aside, &a, &b, 1e-7, Look::Close), Stands::Aside);
+        assert_eq!(stands(&aside, &a, &b, Look::Close), Stands::Aside);
     }
 
     /// Where a panel cuts a set itself, nothing is proven but that it may matter.
@@ -168,6 +227,6 @@ mod tests {
             DVec3::new(0.5, 1., 1.),
             DVec3::new(0.5, 0., 1.),
         ]);
-        assert_eq!(stands(&through, &a, &b, 1e-7, Look::Close), Stands::Between);
+        assert_eq!(stands(&through, &a, &b, Look::Close), Stands::Between);
     }
 }

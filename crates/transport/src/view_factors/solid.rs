@@ -77,6 +77,29 @@ pub fn looks_away(panel: &Panel, obstacles: Obstacles, from: &[DVec3], touch: f6
     from.iter().all(|x| panel.height(*x) <= touch) && obstacles.solids[solid as usize].iter().any(is_before)
 }
 
+/// Share of a segment that must lie within a solid: what starts on a face or passes an edge does not meet the body.
+const LEAST: f64 = 1e-9;
+
+/// Whether a solid stands between all points of two convex sets, which it does if it stands between all their corners: what
+/// a convex body hides from a point is convex, beyond the body and on either side alike.
+pub fn hides(obstacles: Obstacles, solid: u32, ends: [&[DVec3]; 2]) -> bool {
+    let faces = || obstacles.solids[solid as usize].iter().map(|face| &obstacles.panels[*face as usize]);
+    let meets = |p: DVec3, q: DVec3| {
+        let (mut first, mut last) = (0.0f64, 1.0f64);
+        for face in faces() {
+            let (h, k) = (face.height(p), face.height(q));
+            match (h > 0.0, k > 0.0) {
+                (true, true) => return false,
+                (true, false) => first = first.max(h / (h - k)),
+                (false, true) => last = last.min(h / (h - k)),
+                (false, false) => {}
+            }
+        }
+        first + LEAST < last
+    };
+    ends[0].iter().all(|p| ends[1].iter().all(|q| meets(*p, *q)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

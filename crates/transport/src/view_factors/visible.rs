@@ -23,17 +23,52 @@ type Shadow = SmallVec<[(DVec3, f64); 6]>;
 #[derive(Default)]
 pub struct Shadows {
     of: Vec<Shadow>,
+    panels: Vec<u16>,
+}
+
+/// What a point sees of a polygon past panels.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sight {
+    /// F to what is visible and to what is hidden.
+    pub factors: [f64; 2],
+    /// Bit k: panel k hides something.
+    pub hiding: u64,
 }
 
 impl Shadows {
     /// F from the differential area at `x` with unit `normal` to what is visible of the convex polygon `target`, which lies
-    /// above its horizon and faces it, and to what is hidden. Panels within `touch` of x hide nothing.
-    pub fn factor(&mut self, x: DVec3, normal: DVec3, target: &[DVec3], panels: &[&Panel], touch: f64) -> [f64; 2] {
+    /// above its horizon and faces it, and to what is hidden, past the `listed` ones of the panels. Panels within `touch`
+    /// of x hide nothing.
+    pub fn sight(
+        &mut self,
+        (x, normal): (DVec3, DVec3),
+        target: &[DVec3],
+        (panels, listed): (&[&Panel], &[u16]),
+        touch: f64,
+    ) -> Sight {
         self.of.clear();
-        self.of.extend(panels.iter().filter_map(|panel| shadow(x, panel, touch)));
+        self.panels.clear();
+        for &k in listed {
+            if let Some(shadow) = shadow(x, panels[k as usize], touch) {
+                self.of.push(shadow);
+                self.panels.push(k);
+            }
+        }
         let whole = lambert(x, normal, target);
-        let hidden = hidden(x, normal, target, whole, &self.of);
-        [(whole - hidden).max(0.0), hidden]
+        let (mut hidden_all, mut hiding) = (0.0, 0);
+        for (k, shadow) in self.of.iter().enumerate() {
+            let bit = 1u64.checked_shl(u32::from(self.panels[k])).unwrap_or(0);
+            match within(target, shadow) {
+                Within::None => {}
+                Within::All => return Sight { factors: [0.0, whole], hiding: u64::MAX },
+                Within::Part(part) => {
+                    let own = lambert(x, normal, &part);
+                    hidden_all += own - hidden(x, normal, &part, own, &self.of[..k]);
+                    hiding |= bit;
+                }
+            }
+        }
+        Sight { factors: [(whole - hidden_all).max(0.0), hidden_all], hiding }
     }
 
     /// Puts panels in the order of what they hide from a place, most first: what one hides whole need not be looked at
@@ -172,7 +207,7 @@ pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
 
 /// Lambert's contour integral of a polygon above the horizon whose corners run counter-clockwise about its own normal,
 /// which faces x.
-fn lambert(x: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
+pub fn lambert(x: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let mut sum = 0.0;
     let mut a = polygon[polygon.len() - 1] - x;
     for corner in polygon {
