@@ -6,7 +6,7 @@ use clap::Args;
 use radiosity::io::{Document, LoadOptions};
 use radiosity::solve::Solver;
 use radiosity::transport::{FormFactorMethod, HitTable};
-use radiosity::{Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up};
+use radiosity::{Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up, size};
 use std::f64::consts::SQRT_2;
 use std::path::{Path, PathBuf};
 
@@ -75,11 +75,13 @@ pub struct SolveArguments {
     /// How light between elements is found: rays, the default, or one of adaptive, hemicube, hemicube-midpoint, single-plane,
     /// cubic-tetrahedron, global-cube, hemisphere, point, disc, lambert, nusselt, contour, exact, cubature, malley,
     /// area-samples, global-lines. These fill a matrix that grows with the square of the elements, two thousand if no
-    /// --element-size is given. Light of lamps and sky is found the same way in either case.
+    /// --element-size is given. Of them `contour` and `exact` do not see what stands between elements: light goes through
+    /// furniture. Light of lamps and sky is found the same way in either case.
     #[arg(long = "ff", value_name = "NAME", default_value = "rays", hide_default_value = true, value_parser = numbers::form_factors)]
     pub form_factors: FormFactors,
     /// Solver: deflated-jacobi, the default, or one of jacobi, neumann, cg, bicgstab, gmres, gauss-seidel, sor, southwell,
-    /// progressive, shooting-cyclic, shooting-ambient, overshooting, lu, cholesky, random-walk, stochastic-jacobi.
+    /// progressive, shooting-cyclic, shooting-ambient, overshooting, lu, cholesky, random-walk, stochastic-jacobi. cg,
+    /// cholesky, random-walk and stochastic-jacobi need `--ff adaptive`; lu and cholesky fill matrices, as --ff does.
     #[arg(long, value_name = "NAME", default_value_t = Solver::DeflatedJacobi, hide_default_value = true)]
     pub solver: Solver,
     /// Most rounds of refinement.
@@ -144,12 +146,11 @@ impl SolveArguments {
         }
         // A tenth to spare, since the advice is rounded.
         let instead = instead(1.1 * (area * bytes / allowed).sqrt());
-        let megabyte = f64::from(1 << 20);
         Err(Failure::input(format!(
-            "{option}: {count:.1e} {pieces} need {:.1e} MB at least; {:.0} MB are allowed (use {instead}, or allow more by \
+            "{option}: {count:.1e} {pieces} need {:.1e} MB at least; {} are allowed (use {instead}, or allow more by \
              --memory)",
-            needed / megabyte,
-            allowed / megabyte
+            needed / f64::from(1 << 20),
+            size(self.memory)
         )))
     }
 

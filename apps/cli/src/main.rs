@@ -174,6 +174,12 @@ impl From<LoadError> for Failure {
 impl From<radiosity::Error> for Failure {
     fn from(error: radiosity::Error) -> Self {
         match error {
+            radiosity::Error::Elimination { .. } => Failure::input(format!(
+                "{error} (use a larger --element-size, an iterative --solver such as gmres, or allow more by --memory)"
+            )),
+            radiosity::Error::Reciprocity { .. } => {
+                Failure::input(format!("{error} (find them by --ff adaptive, or take another --solver, such as gmres)"))
+            }
             radiosity::Error::Empty(_)
             | radiosity::Error::Memory { .. }
             | radiosity::Error::Factors(_)

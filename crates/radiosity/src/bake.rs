@@ -130,7 +130,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             element_size: Some(if noisy { solution.element_size } else { smaller }),
             ..solve
         };
-        let fits = Solution::memory(tracer, &next) <= next.memory;
+        let fits = Solution::fits(tracer, &next);
         if achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) || is_stalled(&rounds) {
             stages.absorb(&solution.stages);
             return Ok(Baked {

@@ -49,6 +49,40 @@ impl Matrix {
     }
 }
 
+/// Parts that a solver's way is told in.
+const PARTS: usize = 1000;
+
+/// How far a solver is on its way to the tolerance, by its residual: that of steps falls by a factor at a time, that of
+/// random runs with the root of their number.
+struct Way {
+    is_random: bool,
+    tolerance: f64,
+    first: Option<f64>,
+    done: usize,
+}
+
+impl Way {
+    fn new(is_random: bool, tolerance: f64) -> Way {
+        Way { is_random, tolerance, first: None, done: 0 }
+    }
+
+    /// Parts of [`PARTS`] done, never fewer than before, as a residual may rise for a while.
+    fn done(&mut self, info: &Info) -> usize {
+        let residual = info.residual.iter().fold(0f64, |worst, r| worst.max(*r)).max(f64::MIN_POSITIVE);
+        let first = *self.first.get_or_insert(residual);
+        let share = if residual <= self.tolerance {
+            1.0
+        } else if self.is_random {
+            (self.tolerance / residual).powi(2)
+        } else {
+            (first / residual).ln() / (first / self.tolerance).ln()
+        };
+        // The cast saturates, and makes no number zero.
+        self.done = self.done.max((share * PARTS as f64).round() as usize).min(PARTS);
+        self.done
+    }
+}
+
 /// Solves X = E + R F X in place, by the matrix if there is one.
 pub(crate) fn solve(
     (table, matrix): (&HitTable, Option<&Matrix>),
@@ -57,8 +91,9 @@ pub(crate) fn solve(
     (solver, params): (Solver, &Params),
     monitor: &dyn Monitor,
 ) -> Result<Info, Error> {
+    let mut way = Way::new(solver.is_random(), params.tolerance);
     let step = |_: &[f64], info: &Info| {
-        let go = monitor.step(info.steps, info.steps + 1);
+        let go = monitor.step(way.done(info), PARTS);
         if go { Go::On } else { Go::Stop }
     };
     let solved = match matrix {
@@ -77,4 +112,61 @@ pub(crate) fn solve(
         SolveError::Stopped => Error::Stopped,
         other => Error::Solve(other),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_of_a_solver_is_told_by_its_residual() {
+        let at = |residual: f64| Info { residual: vec![0.1 * residual, residual], ..Info::default() };
+        let mut steps = Way::new(false, 1e-4);
+        assert_eq!([1.0, 1e-1, 1e-2, 1e-1, 1e-3, 1e-5].map(|r| steps.done(&at(r))), [0, 250, 500, 500, 750, 1000]);
+        let mut random = Way::new(true, 1e-2);
+        assert_eq!([1.0, 0.1, 0.02, 0.005].map(|r| random.done(&at(r))), [0, 10, 250, 1000]);
+    }
+
+    /// It filled a matrix of 48 GB for the elements of the default table, and panicked.
+    #[test]
+    fn elimination_is_asked_of_no_more_elements_than_its_matrices_fit() {
+        use crate::{Solution, SolveOptions, Tracer, cornell_box};
+        let scene = cornell_box();
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let options = SolveOptions { rays: 32, solver: Solver::Lu, ..SolveOptions::default() };
+        let few = Solution::begin(&tracer, &options, &()).unwrap();
+        assert!(few.elements.len() < 5000, "{}", few.elements.len());
+        let small = SolveOptions { element_size: Some(0.002), ..options };
+        let Err(error) = Solution::begin(&tracer, &small, &()) else { panic!("allowed") };
+        assert!(matches!(error, Error::Elimination { needed, allowed, .. } if needed > allowed), "{error}");
+        // Those that take steps need no such matrix.
+        assert!(small.memory > Solver::Gmres.matrix_bytes(1_000_000));
+    }
+
+    #[test]
+    fn solvers_that_need_reciprocity_are_refused_other_factors() {
+        use crate::{Solution, SolveOptions, Tracer, cornell_box};
+        let scene = cornell_box();
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let method = |name: &str| (name != "rays").then(|| name.parse().unwrap());
+        for solver in Solver::ALL {
+            for name in ["rays", "hemicube", "adaptive"] {
+                let small = SolveOptions { element_size: Some(0.3), rays: 32, ..SolveOptions::default() };
+                let params = Params { tolerance: 0.3, ..small.params };
+                let options = SolveOptions { solver: *solver, form_factors: method(name), params, ..small };
+                let is_refused = match Solution::begin(&tracer, &options, &()) {
+                    Ok(_) => false,
+                    Err(Error::Reciprocity { .. }) => true,
+                    Err(error) => panic!("{solver} with {name}: {error}"),
+                };
+                assert_eq!(is_refused, solver.needs_reciprocity() && name != "adaptive", "{solver} with {name}");
+                // What is not refused works, and what is would have failed after the rays.
+                if solver.needs_reciprocity() && name == "adaptive" {
+                    Solution::new(&tracer, &options, &()).unwrap_or_else(|error| panic!("{solver}: {error}"));
+                }
+            }
+        }
+    }
 }

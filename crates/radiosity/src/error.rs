@@ -1,5 +1,7 @@
 //! What can go wrong between a scene and its light.
 
+use radiosity_scene::size;
+
 /// Why no answer came.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -12,32 +14,59 @@ pub enum Error {
     Solve(#[from] radiosity_solve::SolveError),
     /// The memory that was allowed does not suffice.
     #[error(
-        "{elements} elements with {rays} rays each need {needed} MB; {allowed} MB are allowed (use larger elements or allow more)"
+        "{elements} elements with {rays} rays each need {}; {} allowed (use larger elements or allow more)",
+        size(*needed), are(*allowed)
     )]
     Memory {
         /// Elements asked for.
         elements: usize,
         /// Rays per cell.
         rays: usize,
-        /// Megabytes needed.
+        /// Bytes needed.
         needed: usize,
-        /// Megabytes allowed.
+        /// Bytes allowed.
         allowed: usize,
     },
     /// The memory that was allowed does not hold form factors between all elements.
     #[error(
-        "form factors between {elements} elements need {needed} MB; {allowed} MB are allowed (ask for fewer elements than \
-         {asked}, though each triangle is one at least, or allow more)"
+        "form factors between {elements} elements need {}; {} allowed (ask for fewer elements than {asked}, though each \
+         triangle is one at least, or allow more)",
+        size(*needed), are(*allowed)
     )]
     Matrix {
         /// Elements there would be.
         elements: usize,
         /// Elements asked for.
         asked: usize,
-        /// Megabytes needed.
+        /// Bytes needed.
         needed: usize,
-        /// Megabytes allowed.
+        /// Bytes allowed.
         allowed: usize,
+    },
+    /// The memory that was allowed does not hold the full matrices of elimination.
+    #[error(
+        "{solver} eliminates in full matrices, which for {elements} elements need {}; {} allowed",
+        size(*needed), are(*allowed)
+    )]
+    Elimination {
+        /// The solver.
+        solver: radiosity_solve::Solver,
+        /// Elements there would be.
+        elements: usize,
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes allowed.
+        allowed: usize,
+    },
+    /// The solver needs factors that are the same in both directions, and the method gives others.
+    #[error(
+        "{solver} needs form factors that agree in both directions (A_i F_ij = A_j F_ji), and those by {method} do not"
+    )]
+    Reciprocity {
+        /// The solver.
+        solver: radiosity_solve::Solver,
+        /// The method's name.
+        method: &'static str,
     },
     /// An element is no polygon that form factors can be asked of.
     #[error("{0}")]
@@ -54,6 +83,11 @@ pub enum Error {
     /// The scene has nothing to compute.
     #[error("{0}")]
     Empty(&'static str),
+}
+
+/// A size that is allowed, with its verb.
+fn are(allowed: usize) -> String {
+    size(allowed) + if allowed == 1 { " is" } else { " are" }
 }
 
 impl From<radiosity_transport::Stopped> for Error {

@@ -164,7 +164,7 @@ pub fn measure(
             .then_some(solution.element_size / std::f64::consts::SQRT_2);
         let size = Some(smaller.unwrap_or(solution.element_size));
         let next = SolveOptions { element_size: size, rays: 2 * solution.rays(), ..solve };
-        let fits = Solution::memory(tracer, &next) <= next.memory;
+        let fits = Solution::fits(tracer, &next);
         if achieved || rounds.len() > options.rounds || places.is_empty() || !fits || is_stalled(&rounds) {
             stages.absorb(&solution.stages);
             return Ok(Measurement {

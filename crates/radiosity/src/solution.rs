@@ -62,15 +62,31 @@ impl Default for SolveOptions {
 /// Rays per cell below which an answer is of no use.
 const LEAST_RAYS: usize = 32;
 
-/// Most cells where form factors fill a matrix, unless an element size is asked for: four million pairs.
+/// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
 const MATRIX_CELLS: usize = 2000;
 
 impl SolveOptions {
-    /// Fewer cells, and none of them divided, where the matrix grows with the square of the elements.
+    /// Fewer cells, and none of them divided, where a matrix grows with the square of the elements.
     pub(crate) fn suit_method(&mut self) {
-        if self.form_factors.is_some() {
+        if self.form_factors.is_some() || self.solver.is_direct() {
             (self.cells, self.variation) = (self.cells.min(MATRIX_CELLS), f64::INFINITY);
         }
+    }
+
+    /// Refuses a solver that has no right to the factors of the method: only the adaptive one stores a pair once for both
+    /// directions.
+    fn refuse_unfit_solver(&self) -> Result<(), Error> {
+        if !self.solver.needs_reciprocity() || self.form_factors == Some(FormFactorMethod::Adaptive) {
+            return Ok(());
+        }
+        let method = self.form_factors.map_or("rays", FormFactorMethod::name);
+        Err(Error::Reciprocity { solver: self.solver, method })
+    }
+
+    /// Refuses elimination of so many elements that its matrices are beyond the memory.
+    fn refuse_large_matrices(&self, elements: usize) -> Result<(), Error> {
+        let (solver, needed, allowed) = (self.solver, self.solver.matrix_bytes(elements), self.memory);
+        if needed > allowed { Err(Error::Elimination { solver, elements, needed, allowed }) } else { Ok(()) }
     }
 
     /// Fewer rays where the memory does not hold those that are asked for: an error that is missed tells more than none.
@@ -138,7 +154,8 @@ impl<'a> Solution<'a> {
     /// Cuts the scene into elements, traces their rays and solves: [`Solution::begin`] and one [`Solution::refine`].
     ///
     /// # Errors
-    /// [`Error::Memory`] before anything large is allocated; [`Error::Stopped`]; [`Error::Solve`].
+    /// [`Error::Memory`] and [`Error::Elimination`] before anything large is allocated; [`Error::Reciprocity`];
+    /// [`Error::Stopped`]; [`Error::Solve`].
     pub fn new(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
         let mut solution = Solution::begin(tracer, options, monitor)?;
         solution.refine(options.rays, monitor)?;
@@ -150,7 +167,8 @@ impl<'a> Solution<'a> {
     /// the rows. Call [`Solution::refine`] with ever more rays for ever better answers; each is whole.
     ///
     /// # Errors
-    /// [`Error::Memory`] before anything large is allocated; [`Error::Stopped`].
+    /// [`Error::Memory`] and [`Error::Elimination`] before anything large is allocated; [`Error::Reciprocity`];
+    /// [`Error::Stopped`].
     pub fn begin(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         if mesh.triangles.is_empty() {
@@ -159,8 +177,10 @@ impl<'a> Solution<'a> {
         let mut options = *options;
         options.suit_method();
         let options = &options;
+        options.refuse_unfit_solver()?;
         let stages = Stages::default();
         let element_size = element_size(tracer, options);
+        options.refuse_large_matrices(Elements::count(scene, mesh, element_size))?;
         let needed = Solution::memory(tracer, options);
         if needed > options.memory {
             return Err(memory_error(Elements::count(scene, mesh, element_size), needed, options));
@@ -169,6 +189,7 @@ impl<'a> Solution<'a> {
         let elements = stages.time(monitor, "elements", || {
             divided(tracer, Elements::new(scene, mesh, element_size), options.variation, &watch)
         })?;
+        options.refuse_large_matrices(elements.len())?;
         let Optics { area, reflectance, exitance } = Optics::new(tracer, &elements);
         let exposure = stages.time(monitor, "exposure", || Exposure::new(tracer, mesh, &elements, &watch))?;
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
@@ -248,6 +269,13 @@ impl<'a> Solution<'a> {
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         HitTable::bytes(Elements::count(scene, mesh, element_size(tracer, options)), options.rays)
+    }
+
+    /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
+    pub(crate) fn fits(tracer: &Tracer, options: &SolveOptions) -> bool {
+        let (scene, mesh) = (tracer.scene, tracer.mesh);
+        let elements = Elements::count(scene, mesh, element_size(tracer, options));
+        Solution::memory(tracer, options) <= options.memory && options.solver.matrix_bytes(elements) <= options.memory
     }
 
     /// The tracer that the solution was made with.
@@ -477,8 +505,7 @@ impl<'a> Solution<'a> {
 
 /// What an answer would need that the options do not allow.
 fn memory_error(elements: usize, needed: usize, options: &SolveOptions) -> Error {
-    let megabytes = |bytes: usize| bytes.div_ceil(1 << 20);
-    Error::Memory { elements, rays: options.rays, needed: megabytes(needed), allowed: megabytes(options.memory) }
+    Error::Memory { elements, rays: options.rays, needed, allowed: options.memory }
 }
 
 /// Width of a cell: as asked, or such that the scene's area makes as many as asked.

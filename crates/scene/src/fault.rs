@@ -48,6 +48,18 @@ pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
+/// Bytes in the largest unit (powers of 1024) of which there is one at least, to two digits: `size(1 << 20)` is "1.0 MB".
+pub fn size(bytes: usize) -> String {
+    let units = [("TB", 40), ("GB", 30), ("MB", 20), ("KB", 10)];
+    match units.into_iter().find(|(_, shift)| bytes >> shift > 0) {
+        None => counted(bytes, "byte", "bytes"),
+        Some((unit, shift)) => {
+            let value = bytes as f64 / (1u64 << shift) as f64;
+            if value < 9.95 { format!("{value:.1} {unit}") } else { format!("{value:.0} {unit}") }
+        }
+    }
+}
+
 /// All faults of an input, in the order they were met.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
@@ -92,3 +104,18 @@ impl fmt::Display for Faults {
 }
 
 impl std::error::Error for Faults {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whole megabytes made "0 MB allowed" of a small limit.
+    #[test]
+    fn sizes_have_the_unit_that_fits() {
+        let said = [0, 1, 1023, 1024, 10 << 10, 1_000_000, 1 << 20, 51_539_607_552, usize::MAX].map(size);
+        assert_eq!(
+            said,
+            ["0 bytes", "1 byte", "1023 bytes", "1.0 KB", "10 KB", "977 KB", "1.0 MB", "48 GB", "16777216 TB"]
+        );
+    }
+}

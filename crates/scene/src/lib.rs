@@ -21,7 +21,7 @@ pub use camera::{Camera, Projection};
 pub use element_facets::ElementError;
 pub use elements::{ElementId, Elements};
 pub use facet::{Enclosure, EnclosureSurface, Facet, FacetError};
-pub use fault::{Fault, Faults, Severity, counted};
+pub use fault::{Fault, Faults, Severity, counted, size};
 pub use light::{PointLight, PointLightKind};
 pub use material::{AlphaMode, Material, TextureRef};
 pub use mesh::{Mesh, Side};

@@ -163,7 +163,31 @@ table! {
     }
 }
 
+/// Matrices that faer holds at a time: the one that is given; for LU the two factors, for Cholesky one.
+const LU_MATRICES: usize = 3;
+const CHOLESKY_MATRICES: usize = 2;
+
 impl Solver {
+    /// Whether it needs A_i F_ij = A_j F_ji, to about rounding: of factors that are stored once for both directions.
+    pub fn needs_reciprocity(self) -> bool {
+        matches!(self, Solver::Cg | Solver::Cholesky | Solver::RandomWalk | Solver::StochasticJacobi)
+    }
+
+    /// Whether it eliminates: in a full matrix, whatever is zero in F.
+    pub fn is_direct(self) -> bool {
+        matches!(self, Solver::Lu | Solver::Cholesky)
+    }
+
+    /// Bytes of the full matrices that it fills for so many unknowns; none where it takes F as it is stored.
+    pub fn matrix_bytes(self, unknowns: usize) -> usize {
+        let matrices = match self {
+            Solver::Lu => LU_MATRICES,
+            Solver::Cholesky => CHOLESKY_MATRICES,
+            _ => 0,
+        };
+        unknowns.saturating_mul(unknowns).saturating_mul(matrices * size_of::<f64>())
+    }
+
     /// All names, separated by commas.
     pub(crate) fn names() -> String {
         Solver::ALL.iter().map(|solver| solver.name()).collect::<Vec<_>>().join(", ")

@@ -216,9 +216,7 @@ fn refuse_too_many(tracer: &Tracer, options: &CompareOptions) -> Result<(), Erro
     let both = if options.methods.iter().all(is_rays) { REFERENCE_BYTES } else { REFERENCE_BYTES + CONTENDER_BYTES };
     let needed = elements.saturating_mul(elements).saturating_mul(both);
     if needed > options.memory {
-        let megabytes = |bytes: usize| bytes.div_ceil(1 << 20);
-        let (needed, allowed) = (megabytes(needed), megabytes(options.memory));
-        return Err(Error::Matrix { elements, asked: options.elements, needed, allowed });
+        return Err(Error::Matrix { elements, asked: options.elements, needed, allowed: options.memory });
     }
     Ok(())
 }

@@ -55,8 +55,8 @@ pub enum FactorError {
     Stopped,
     /// The memory allowed does not suffice.
     #[error(
-        "the form factors of {facets} facets take more than the {} MB allowed (allow more, or use fewer facets)",
-        allowed >> 20
+        "the form factors of {facets} facets take more than the {} allowed (allow more, or use fewer facets)",
+        radiosity_scene::size(*allowed)
     )]
     Memory {
         /// Facets.
