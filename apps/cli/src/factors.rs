@@ -4,9 +4,10 @@ use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::{Failure, Global, numbers};
 use clap::{Args, ValueEnum};
+use radiosity::io::vs3::NoRow;
 use radiosity::io::{FactorFormat, FactorRows, FactorTable, Grouping, LoadOptions, Vs3, enclosure_of, load_enclosure};
 use radiosity::transport::{FormFactorMethod, FormFactors};
-use radiosity::{Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Severity, counted};
+use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Severity, counted};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -21,22 +22,24 @@ pub struct Arguments {
     output: Option<PathBuf>,
     /// How factors are found; `radiosity compare` shows them side by side. One of: adaptive (the default), hemicube,
     /// hemicube-midpoint, single-plane, cubic-tetrahedron, global-cube, hemisphere, point, disc, lambert, nusselt,
-    /// contour, exact, cubature, malley, area-samples, global-lines.
+    /// contour, exact, cubature, malley, area-samples, global-lines. Of these `contour` and `exact` do not see what stands
+    /// between surfaces: they are for scenes in which nothing does.
     #[arg(long, value_name = "NAME", default_value_t = FormFactorMethod::Adaptive, hide_default_value = true)]
     method: FormFactorMethod,
-    /// Which triangles of a .glb, .gltf or .obj are one surface. A .vs3 has its own.
-    #[arg(long, value_enum, default_value_t = By::Object)]
-    by: By,
+    /// Which triangles of a .glb, .gltf or .obj are one surface; those of an object by default. A .vs3 has its own.
+    #[arg(long, value_enum)]
+    by: Option<By>,
     /// Width of elements in metres, for `--by element`.
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     element_size: Option<f64>,
-    /// Largest error of a factor between facets that see each other partly (adaptive). What is not hidden at all is found to
-    /// 1e-9.
-    #[arg(long, value_name = "E", default_value_t = 1e-5, allow_negative_numbers = true, value_parser = numbers::positive)]
-    accuracy: f64,
-    /// Cells along a side of the surface that hemicube and its like project on.
-    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u16).range(2..=4096))]
-    resolution: u16,
+    /// Largest error of a factor between facets that see each other partly, 1e-5 by default; for the adaptive method. What is
+    /// not hidden at all is found to 1e-9 or better.
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = numbers::positive)]
+    accuracy: Option<f64>,
+    /// Cells along a side of the surface that hemicube and its like project on, 256 by default; `hemisphere` casts the square
+    /// of it rays.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=4096))]
+    resolution: Option<u16>,
     /// Make rows sum to one by moving uncertain factors, and no others.
     #[arg(long)]
     close: bool,
@@ -77,27 +80,67 @@ struct Input {
     title: String,
 }
 
+impl Arguments {
+    /// Whether the scene's file has this ending.
+    fn is(&self, ending: &str) -> bool {
+        self.scene.as_ref().and_then(|s| s.extension()).is_some_and(|e| e.eq_ignore_ascii_case(ending))
+    }
+
+    fn by(&self) -> By {
+        self.by.unwrap_or(By::Object)
+    }
+
+    /// A call that means something else than it does is not carried out.
+    fn refuse_what_has_no_effect(&self) -> Result<(), Failure> {
+        let method = self.method;
+        let [adaptive, projects] = [method == FormFactorMethod::Adaptive, matches!(method, FormFactorMethod::Row(_))];
+        let by_element = self.by == Some(By::Element);
+        let rules = [
+            (self.by.is_some() && self.is("vs3"), "--by is for scenes: a .vs3 has its own surfaces".to_owned()),
+            (
+                self.unit.is_some() && !self.is("obj") && !self.is("vs3"),
+                "--unit is for .obj and .vs3 files: lengths of others are metres".to_owned(),
+            ),
+            (self.element_size.is_some() && !by_element, "--element-size is for --by element".to_owned()),
+            (
+                self.close && !adaptive,
+                "--close needs the adaptive method: the factors of others are not reciprocal".to_owned(),
+            ),
+            (
+                self.accuracy.is_some() && !adaptive,
+                format!("--accuracy is for the adaptive method: {method} is as exact as it is and states its errors"),
+            ),
+            (
+                self.resolution.is_some() && !projects,
+                format!("--resolution is for methods that project, such as hemicube: {method} does not"),
+            ),
+        ];
+        match rules.into_iter().find(|(has_no_effect, _)| *has_no_effect) {
+            Some((_, why)) => Err(Failure::input(why)),
+            None => Ok(()),
+        }
+    }
+
+    fn options(&self) -> FactorsOptions {
+        let mut options = FactorsOptions { method: self.method, close: self.close, ..FactorsOptions::default() };
+        let form = &mut options.form;
+        form.adaptive.accuracy = self.accuracy.unwrap_or(form.adaptive.accuracy);
+        form.adaptive.clear_accuracy = form.adaptive.clear_accuracy.min(form.adaptive.accuracy);
+        form.adaptive.memory = self.memory;
+        form.look.resolution = self.resolution.map_or(form.look.resolution, usize::from);
+        options
+    }
+}
+
 fn read(arguments: &Arguments) -> Result<Input, Failure> {
     let options = LoadOptions { metres_per_unit: arguments.unit.unwrap_or(1.0), ..LoadOptions::default() };
-    let grouping = match arguments.by {
+    let grouping = match arguments.by() {
         By::Material => Grouping::Material,
         By::Object => Grouping::Object,
         By::Triangle | By::Element => Grouping::Triangle,
     };
-    let ending = |ending: &str| {
-        arguments.scene.as_ref().and_then(|s| s.extension()).is_some_and(|e| e.eq_ignore_ascii_case(ending))
-    };
-    if arguments.unit.is_some() && !ending("obj") && !ending("vs3") {
-        return Err(Failure::input("--unit is for .obj and .vs3 files: lengths of others are metres"));
-    }
-    if arguments.element_size.is_some() && arguments.by != By::Element {
-        return Err(Failure::input("--element-size is for --by element"));
-    }
     let title = arguments.scene.as_ref().map_or("built-in Cornell box".to_owned(), |s| s.display().to_string());
-    if arguments.by == By::Element || arguments.scene.is_none() {
-        if ending("vs3") {
-            return Err(Failure::input("--by element is for scenes: a .vs3 has its own surfaces"));
-        }
+    if arguments.by() == By::Element || arguments.scene.is_none() {
         let (scene, mut faults) = match &arguments.scene {
             None => (radiosity::cornell_box(), Faults::default()),
             Some(path) => {
@@ -105,7 +148,7 @@ fn read(arguments: &Arguments) -> Result<Input, Failure> {
                 (loaded.scene, loaded.faults)
             }
         };
-        let enclosure = if arguments.by == By::Element {
+        let enclosure = if arguments.by() == By::Element {
             let Some(size) = arguments.element_size else {
                 return Err(Failure::input("--by element needs --element-size: width of elements in metres"));
             };
@@ -123,6 +166,7 @@ fn read(arguments: &Arguments) -> Result<Input, Failure> {
 
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
+    arguments.refuse_what_has_no_effect()?;
     let inputs: Vec<_> = arguments.scene.as_deref().into_iter().collect();
     let mut outputs = Outputs::new(&inputs);
     if let Some(path) = &arguments.output {
@@ -134,22 +178,13 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         progress.say(&fault.to_string());
     }
     let wants_script_f = arguments.script_f || input.vs3.as_ref().is_some_and(|v| v.settings.emit);
-    let masked = input.vs3.as_ref().is_some_and(|v| !v.masks.is_empty());
     let emittances: Option<Vec<f64>> = input.enclosure.surfaces.iter().map(|s| s.emittance).collect();
     if wants_script_f && emittances.is_none() {
         return Err(Failure::input("script-F needs an emittance for every surface: only .vs3 files give them"));
     }
-    if arguments.close && arguments.method != FormFactorMethod::Adaptive {
-        return Err(Failure::input("--close needs the adaptive method: the factors of others are not reciprocal"));
-    }
-
-    let mut options = FactorsOptions { method: arguments.method, close: arguments.close, ..FactorsOptions::default() };
-    options.form.adaptive.accuracy = arguments.accuracy;
-    options.form.adaptive.memory = arguments.memory;
-    options.form.look.resolution = arguments.resolution.into();
     progress.parts();
-    let found = radiosity::factors(&input.enclosure, &options, progress)?;
-    let table = Table::new(&input, &found, emittances, wants_script_f, masked)?;
+    let found = radiosity::factors(&input.enclosure, &arguments.options(), progress)?;
+    let table = Table::new(&input, &found, emittances, wants_script_f)?;
 
     if let Some(path) = &arguments.output {
         // The ending was looked at when the file was promised.
@@ -158,11 +193,12 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.commit()?;
     }
     progress.finish();
+    warnings(&input, &found).iter().for_each(|line| progress.say(line));
     if global.json {
         return print(&event(arguments, &input, &found, &table, progress).to_string());
     }
     if !global.quiet {
-        for line in summary(&input, &found, arguments) {
+        for line in summary(&input, &found, &table, arguments) {
             progress.say(&line);
         }
     }
@@ -195,13 +231,7 @@ enum Matrix {
 }
 
 impl Table {
-    fn new(
-        input: &Input,
-        found: &Factors,
-        emittances: Option<Vec<f64>>,
-        is_script_f: bool,
-        masked: bool,
-    ) -> Result<Table, Failure> {
+    fn new(input: &Input, found: &Factors, emittances: Option<Vec<f64>>, is_script_f: bool) -> Result<Table, Failure> {
         let enclosure = &input.enclosure;
         let factors = &found.factors;
         let n = factors.len();
@@ -220,21 +250,9 @@ impl Table {
             let script = found.script_f(&emittances).map_err(Failure::input)?;
             return Ok(table(Matrix::Dense(script, None), Some(emittances)));
         }
-        if let Some(vs3) = input.vs3.as_ref().filter(|_| masked) {
-            // Masks are put back into the matrix, as View3D reports them.
-            let vs3 = Vs3 { enclosure: enclosure.clone(), ..vs3.clone() };
-            let all = vs3.with_masks(&factors.areas, &factors.dense());
-            return Ok(Table {
-                names: all.surfaces.iter().map(|s| s.name.clone()).collect(),
-                emittances: all.surfaces.iter().map(|s| s.emittance).collect(),
-                areas: all.areas,
-                matrix: Matrix::Dense(all.factors, None),
-                is_closed,
-                is_script_f,
-            });
-        }
         let (share, from) = SPARSE;
-        if n >= from && (factors.values.len() as f64) < share * (n as f64).powi(2) {
+        let has_masks = input.vs3.as_ref().is_some_and(|vs3| !vs3.masks.is_empty());
+        if !has_masks && n >= from && (factors.values.len() as f64) < share * (n as f64).powi(2) {
             return Ok(table(Matrix::Sparse(factors.clone()), emittances));
         }
         let mut errors = vec![0f32; n * n];
@@ -243,7 +261,27 @@ impl Table {
                 errors[i * n + j] = error as f32;
             }
         }
+        if let Some(vs3) = input.vs3.as_ref().filter(|_| has_masks) {
+            // Masks are put back into the matrix, as View3D reports them.
+            let vs3 = Vs3 { enclosure: enclosure.clone(), ..vs3.clone() };
+            let all = vs3.with_masks(&factors.areas, &factors.dense(), &errors);
+            return Ok(Table {
+                names: all.surfaces.iter().map(|s| s.name.clone()).collect(),
+                emittances: all.surfaces.iter().map(|s| s.emittance).collect(),
+                areas: all.areas,
+                matrix: Matrix::Dense(all.factors, Some(all.errors)),
+                is_closed,
+                is_script_f,
+            });
+        }
         Ok(table(Matrix::Dense(factors.dense(), Some(errors)), emittances))
+    }
+
+    /// Least and largest sum of a row as it goes out.
+    fn row_sums(&self) -> [f64; 2] {
+        let Matrix::Dense(values, _) = &self.matrix else { return [f64::NAN; 2] };
+        let sums = values.chunks(self.names.len().max(1)).map(|row| row.iter().sum::<f64>());
+        sums.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], s| [low.min(s), high.max(s)])
     }
 
     fn borrowed(&self) -> FactorTable<'_> {
@@ -266,11 +304,108 @@ impl Table {
     }
 }
 
-fn name(enclosure: &Enclosure, surface: usize) -> &str {
-    enclosure.surfaces.get(surface).map_or("", |s| s.name.as_str())
+/// A surface as messages call it: by its name, or by its number from 1.
+fn name(enclosure: &Enclosure, surface: usize) -> String {
+    match enclosure.surfaces.get(surface).map_or("", |s| s.name.as_str()) {
+        "" => format!("surface {}", surface + 1),
+        name => format!("'{name}'"),
+    }
 }
 
-fn summary(input: &Input, found: &Factors, arguments: &Arguments) -> Vec<String> {
+/// Names that are listed before "and N more".
+const LISTED: usize = 6;
+
+fn list(mut names: Vec<String>) -> String {
+    let more = names.len().saturating_sub(LISTED);
+    names.truncate(LISTED);
+    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}
+
+/// Which surfaces of a .vs3 have which rows, where that is not plain: masks have rows without being surfaces of the
+/// exchange, others are surfaces of the file and have none.
+fn rows_of_vs3(vs3: &Vs3, enclosure: &Enclosure, is_script_f: bool) -> Vec<String> {
+    let title =
+        |number: u32, name: &str| if name.is_empty() { number.to_string() } else { format!("{number} '{name}'") };
+    let mut lines = Vec::new();
+    if !vs3.masks.is_empty() {
+        let masks = vs3.masks.iter().map(|m| format!("{} upon {}", title(m.number, &m.name), name(enclosure, m.base)));
+        let rows = counted(vs3.masks.len(), "mask", "masks");
+        lines.push(format!("{rows}: {}", list(masks.collect())));
+        let (surfaces, all) = (enclosure.surfaces.len(), enclosure.surfaces.len() + vs3.masks.len());
+        lines.push(if is_script_f {
+            format!(
+                "script-F has {}, of surfaces: a mask sees its base alone, and what it covers takes no part",
+                counted(surfaces, "row", "rows")
+            )
+        } else {
+            format!(
+                "the matrix has {all} rows, {surfaces} of surfaces and {} of masks, in the order of the file: a mask sees its \
+                 base and nothing else",
+                vs3.masks.len()
+            )
+        });
+    }
+    let of = |wanted: fn(&NoRow) -> bool| vs3.rowless.iter().filter(move |r| wanted(&r.why));
+    let nulls = of(|why| matches!(why, NoRow::Null(_)));
+    let nulls: Vec<String> = nulls.map(|r| title(r.number, &r.name)).collect();
+    if !nulls.is_empty() {
+        let count = counted(
+            nulls.len(),
+            "null surface has no row: what it covers",
+            "null surfaces have no rows: what they cover",
+        );
+        lines.push(format!("{count} is no part of the base and lets nothing through ({})", list(nulls)));
+    }
+    let parts = vs3.rowless.iter().filter_map(|r| match r.why {
+        NoRow::Part(whole) => Some(format!("{} with {}", title(r.number, &r.name), name(enclosure, whole))),
+        _ => None,
+    });
+    let parts: Vec<String> = parts.collect();
+    if !parts.is_empty() {
+        let count = counted(parts.len(), "surface is", "surfaces are");
+        lines.push(format!("{count} combined with another and counted there ({})", list(parts)));
+    }
+    let obstructions = of(|why| *why == NoRow::Obstruction).count();
+    if obstructions > 0 {
+        let count = counted(
+            obstructions,
+            "obstruction has no row: it only stands",
+            "obstructions have no rows: they only stand",
+        );
+        lines.push(format!("{count} in the way"));
+    }
+    lines
+}
+
+/// What is doubtful about factors: worth a warning, whatever goes out.
+fn warnings(input: &Input, found: &Factors) -> Vec<String> {
+    let name = |surface| name(&input.enclosure, surface);
+    let mut lines = Vec::new();
+    if let Some(missed) = &found.missed {
+        let [from, to] = missed.largest.pair;
+        lines.push(format!(
+            "warning: the accuracy of {:e} was not reached: {} stated with larger errors, {:.1e} at most, from {} to {} \
+             (cut large surfaces into pieces, or allow more)",
+            missed.asked,
+            counted(missed.pairs, "pair of facets is", "pairs of facets are"),
+            missed.largest.error,
+            name(from),
+            name(to),
+        ));
+    }
+    if let Some(excess) = &found.excess {
+        lines.push(format!(
+            "warning: {} to more than one, by more than stated errors allow: {:.6} at {} (surfaces that overlap or intersect \
+             are counted twice)",
+            counted(excess.rows, "row sums", "rows sum"),
+            excess.sum,
+            name(excess.row),
+        ));
+    }
+    lines
+}
+
+fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments) -> Vec<String> {
     let enclosure = &input.enclosure;
     let mut head = format!(
         "{}: {}, {}",
@@ -282,6 +417,7 @@ fn summary(input: &Input, found: &Factors, arguments: &Arguments) -> Vec<String>
         head += &format!(", {} in the way", counted(enclosure.obstructions.len(), "more stands", "more stand"));
     }
     let mut lines = vec![head];
+    lines.extend(input.vs3.iter().flat_map(|vs3| rows_of_vs3(vs3, enclosure, table.is_script_f)));
     if let Some(c) = found.factors.choices {
         let cubature: usize = c.clear_cubature.iter().sum();
         lines.push(format!(
@@ -296,19 +432,20 @@ fn summary(input: &Input, found: &Factors, arguments: &Arguments) -> Vec<String>
     }
     let closure = &found.closure;
     let [low, high] = found.row_sums;
-    lines.push(format!("rows sum to {low:.7} … {high:.7}, as found"));
+    let of = if table.is_script_f { "rows of F" } else { "rows" };
+    lines.push(format!("{of} sum to {low:.7} … {high:.7}, as found"));
     if enclosure.is_closed || high > 1.0 + 1e-3 || low > 1.0 - 1e-2 {
         lines.push(format!(
-            "closure: off by {:.1e} (RMS), at most {:.1e} at '{}'",
+            "closure: off by {:.1e} (RMS), at most {:.1e} at {}",
             closure.rms,
             closure.largest,
             name(enclosure, closure.row)
         ));
     }
     if arguments.method == FormFactorMethod::Adaptive {
-        let largest = found.factors.errors.iter().fold(0f32, |m, e| m.max(*e));
-        lines.push(format!("reciprocal by storage; errors of factors at most {largest:.1e}"));
+        lines.push(format!("reciprocal by storage; {}", largest_error(enclosure, found)));
     } else {
+        lines.push(largest_error(enclosure, found));
         lines.push(format!("reciprocity: off by {:.1e} at most", found.reciprocity));
         if !arguments.method.sees_occlusion() {
             lines.push(format!("{} does not see what stands between surfaces", arguments.method));
@@ -327,7 +464,22 @@ fn summary(input: &Input, found: &Factors, arguments: &Arguments) -> Vec<String>
             ),
         });
     }
+    if table.is_script_f {
+        let [low, high] = table.row_sums();
+        lines.push(format!(
+            "script-F, with all reflections in it, is what goes out: its rows sum to {low:.7} … {high:.7} (in a closed \
+             enclosure to emittances), and no error is known of it"
+        ));
+    }
     lines
+}
+
+fn largest_error(enclosure: &Enclosure, found: &Factors) -> String {
+    let Doubt { error, pair: [from, to] } = found.largest_error;
+    if error == 0.0 {
+        return "errors of factors: none stated".to_owned();
+    }
+    format!("errors of factors at most {error:.1e}, from {} to {}", name(enclosure, from), name(enclosure, to))
 }
 
 fn event(
@@ -337,6 +489,7 @@ fn event(
     table: &Table,
     progress: &Progress,
 ) -> serde_json::Value {
+    let named = |surface: usize| input.enclosure.surfaces.get(surface).map(|s| s.name.as_str());
     let shown = arguments.output.is_none() && table.names.len() <= SHOWN;
     let rows: Option<Vec<&[f64]>> = match &table.matrix {
         Matrix::Dense(values, _) if shown => Some(values.chunks(table.names.len()).collect()),
@@ -346,6 +499,11 @@ fn event(
         "event": "result", "method": arguments.method.name(), "surfaces": table.names, "areas": table.areas,
         "emittances": table.emittances, "facets": input.enclosure.facets.len(), "script_f": table.is_script_f,
         "closure": found.closure, "row_sums": found.row_sums, "reciprocity": found.reciprocity,
+        "largest_error": { "error": found.largest_error.error, "pair": found.largest_error.pair.map(named) },
+        "accuracy_missed": found.missed.map(|m| json!({
+            "asked": m.asked, "pairs_missed": m.pairs, "largest": m.largest.error, "pair": m.largest.pair.map(named),
+        })),
+        "excess": found.excess.map(|e| json!({ "rows": e.rows, "row": named(e.row), "sum": e.sum, "errors": e.errors })),
         "repair": found.repair, "choices": found.factors.choices, "stages": progress.spent(),
         "seconds": progress.seconds(), "output": arguments.output, "factors": rows,
     })

@@ -108,12 +108,12 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("bake --seed one", "invalid digit"),
         ("bake --size 0x5", "1280x720"),
         ("bake --exposure inf", "-60 to 60"),
-        ("bake --texels-per-metre 1e9", "1.9e18 texels need 7.3e14 MB at least; 4096 MB are allowed (use 2149 or less"),
+        ("bake --texels-per-metre 1e9", "1.9e18 texels need 7.3e14 MB at least; 4.0 GB are allowed (use 2149 or less"),
         ("bake --texels-per-metre inf", "above 0"),
         ("bake --texels-per-metre 104 --memory 8M --element-size 0.3 --error 50%", "ask for fewer per metre"),
         (
             "bake --element-size 1e-9",
-            "3.8e18 elements need 9.4e14 MB at least; 4096 MB are allowed (use 0.00053 or more",
+            "3.8e18 elements need 9.4e14 MB at least; 4.0 GB are allowed (use 0.00053 or more",
         ),
         ("render -o a.png --element-size 1e-9", "elements need"),
         ("measure --points good.csv --element-size 1e-9", "elements need"),
@@ -151,7 +151,15 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("render -o a.png --eye -1,2,3 --target -1,2,3", "the same place"),
         ("render -o a.png --eye 1,2,3 --target 0,0,0 --camera front", "cannot be used with"),
         ("render -o a.png --eye 1,2,3 --target 0,0,0 --fov 200", "degrees from 1 to 170"),
-        ("bake --memory 1K", "use larger elements or allow more"),
+        ("bake --memory 1K", "1.0 KB are allowed (use larger elements or allow more"),
+        (
+            "bake --solver lu --element-size 0.003",
+            "TB; 4.0 GB are allowed (use a larger --element-size, an iterative --solver",
+        ),
+        ("bake --solver cg", "those by rays do not (find them by --ff adaptive, or take another --solver"),
+        ("render -o a.png --solver cholesky --ff hemicube", "--ff adaptive"),
+        ("measure --points good.csv --solver random-walk", "--ff adaptive"),
+        ("bake --solver stochastic-jacobi", "--ff adaptive"),
         ("bake one.obj -o lit.obj", "must end in .glb"),
         ("render", "--output"),
         ("render -o a.jpg", ".png or .exr"),
@@ -169,6 +177,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("compare --elements 0", "4..=1000000"),
         ("compare --memory 1M", "ask for fewer elements"),
         ("compare -o a.pdf", "must end in .html or .json"),
+        ("factors .", ".: is a folder (name the .vs3, .glb"),
     ] {
         let run = room.run(call.split_whitespace());
         assert_eq!(run.code, Some(2), "{call}: {run:?}");
@@ -697,10 +706,98 @@ fn factors_refuse_what_makes_no_sense() {
     refused(&["squares.vs3", "-o", "f.doc"], "must end in");
     refused(&["squares.vs3", "--close", "--method", "hemicube"], "adaptive");
     refused(&["squares.vs3", "--by", "element"], ".vs3");
+    refused(&["squares.vs3", "--by", "object"], "--by is for scenes");
+    refused(&["squares.vs3", "--resolution", "64"], "adaptive does not");
+    refused(&["squares.vs3", "--resolution", "64", "--method", "lambert"], "lambert does not");
+    refused(&["squares.vs3", "--accuracy", "1e-3", "--method", "hemicube"], "hemicube is as exact as it is");
+    refused(&["--unit", "mm"], "--unit is for");
+    refused(&["--element-size", "0.1"], "--by element");
+    refused(
+        &["--by", "element", "--element-size", "0.1", "--memory", "1K", "--method", "disc"],
+        "than the 1.0 KB allowed",
+    );
     refused(&["--by", "element"], "--element-size");
     refused(&["--script-f"], "emittance");
     refused(&["--by", "element", "--element-size", "0.02", "--memory", "1M"], "allow more");
     assert_eq!(room.names(), ["broken.vs3", "squares.vs3"]);
+}
+
+/// A wall with a mask, a null surface and a combined one, a plate before it, and the opposite wall.
+const WALL: &str = "T wall\nF 3\nV 1 0 0 0\nV 2 4 0 0\nV 3 4 3 0\nV 4 0 3 0\nV 5 0 0 2\nV 6 4 0 2\nV 7 4 3 2\nV 8 0 3 2\n\
+                    V 9 .5 .5 0\nV 10 1 .5 0\nV 11 1 1 0\nV 12 .5 1 0\nV 13 2 .5 0\nV 14 3 .5 0\nV 15 3 1 0\nV 16 2 1 0\n\
+                    V 17 1 1 1\nV 18 2 1 1\nV 19 2 2 1\nV 20 1 2 1\nV 21 2 2 0\nV 22 3 2 0\nV 23 3 2.5 0\nV 24 2 2.5 0\n\
+                    S 1 1 2 3 4 0 0 .9 wall\nS 2 8 7 6 5 0 0 .8 opposite\nM 3 12 11 10 9 1 0 .6 cupboard\n\
+                    N 4 16 15 14 13 1 0 .4 hole\nS 5 21 22 23 24 1 2 .8 panel\nO 6 17 18 19 20\nEnd of data\n";
+
+/// The summary told of fewer surfaces than the file has rows, and `error` was missing in it.
+#[test]
+fn rows_of_masks_and_lack_of_rows_are_explained() {
+    let room = Room::new("factors-masks");
+    room.write("wall.vs3", WALL);
+    let run = room.run(["factors", "wall.vs3", "-o", "f.npz"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    for said in [
+        "wall.vs3: 2 surfaces",
+        "1 mask: 3 'cupboard' upon 'wall'",
+        "the matrix has 3 rows, 2 of surfaces and 1 of masks",
+        "1 null surface has no row: what it covers is no part of the base and lets nothing through (4 'hole')",
+        "1 surface is combined with another and counted there (5 'panel' with 'opposite')",
+        "1 obstruction has no row",
+        "errors of factors at most",
+    ] {
+        assert!(run.err.contains(said), "{said}: {}", run.err);
+    }
+    let holds = |bytes: Vec<u8>, name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
+    assert!(holds(room.read("f.npz"), b"error.npy"));
+
+    let script = room.run(["factors", "wall.vs3", "--script-f", "-o", "s.npz"]);
+    assert_eq!(script.code, Some(0), "{script:?}");
+    for said in [
+        "script-F has 2 rows, of surfaces",
+        "rows of F sum to",
+        "script-F, with all reflections in it, is what goes out",
+    ] {
+        assert!(script.err.contains(said), "{said}: {}", script.err);
+    }
+    assert!(script.err.contains("no error is known of it") && !holds(room.read("s.npz"), b"error.npy"));
+}
+
+#[test]
+fn an_accuracy_that_was_not_reached_and_rows_above_one_are_warned_of() {
+    let room = Room::new("factors-doubt");
+    room.write("squares.vs3", SQUARES);
+    let fine = room.run(["factors", "squares.vs3", "--accuracy", "1e-3"]);
+    assert!(fine.code == Some(0) && !fine.err.contains("warning"), "{fine:?}");
+    let call = ["factors", "squares.vs3", "--accuracy", "1e-30", "-o", "f.npz"];
+    let missed = room.run(call);
+    assert_eq!(missed.code, Some(0), "{missed:?}");
+    assert!(
+        missed.err.contains("warning: the accuracy of 1e-30 was not reached: 1 pair of facets is stated"),
+        "{missed:?}"
+    );
+    let event = room.run(call.iter().chain(&["--json"])).result();
+    assert!(event["accuracy_missed"]["largest"].as_f64().unwrap() > 1e-30, "{event}");
+    let mut pair: Vec<&str> =
+        event["accuracy_missed"]["pair"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    pair.sort_unstable();
+    assert_eq!(pair, ["ceiling", "floor"]);
+    assert!(event["excess"].is_null() && event["largest_error"]["error"].as_f64().unwrap() > 0.0, "{event}");
+
+    // A second floor in the place of the first.
+    room.write(
+        "twice.vs3",
+        &SQUARES
+            .replace("O 3 9 10 11 12", "S 3 1 2 3 4 0 0 .8 again")
+            .replace(" 0 0 1\n", " 0 0 .05\n")
+            .replace(" 1 0 1\n", " 1 0 .05\n")
+            .replace(" 1 1 1\n", " 1 1 .05\n")
+            .replace(" 0 1 1\n", " 0 1 .05\n"),
+    );
+    let twice = room.run(["factors", "twice.vs3"]);
+    assert!(
+        twice.err.contains("warning: 1 row sums to more than one") && twice.err.contains("at 'ceiling'"),
+        "{twice:?}"
+    );
 }
 
 /// Classic methods and solvers by their names give the light that rays give.

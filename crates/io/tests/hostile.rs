@@ -142,7 +142,7 @@ fn damaged_view3d_files() {
         for facet in vs3.enclosure.facets.iter().chain(&vs3.enclosure.obstructions) {
             assert!(facet.area() > 0.0 && facet.corners().iter().all(|c| c.is_finite()), "{facet:?}");
         }
-        let masked = vs3.with_masks(&areas, &vec![0.0; areas.len().pow(2)]);
+        let masked = vs3.with_masks(&areas, &vec![0.0; areas.len().pow(2)], &vec![0.0; areas.len().pow(2)]);
         assert_eq!(masked.areas.len(), areas.len() + vs3.masks.len());
     });
     let output = b"View3D 3.3.1 0 1 0 2          \n1 1\n0.000000 1.000000\n1.000000 0.000000\n0.900 0.900\n";

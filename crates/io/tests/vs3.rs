@@ -1,6 +1,7 @@
 //! View3D files: what they say reaches the enclosure, and every fault is named with its line.
 
 use glam::DVec3;
+use radiosity_io::vs3::NoRow;
 use radiosity_io::{Grouping, LoadOptions, Vs3, load_enclosure, parse_vs3};
 use radiosity_scene::Facet;
 
@@ -89,6 +90,10 @@ fn what_lies_upon_a_base_is_cut_out_of_it() {
         assert_eq!(count, inside, "{x}, {y}");
     }
 
+    // Each surface of the file that has no row is named, and why.
+    let rowless: Vec<_> = wall.rowless.iter().map(|r| (r.number, r.name.as_str(), r.why)).collect();
+    assert_eq!(rowless, [(6, "hole", NoRow::Null(0)), (8, "picture", NoRow::Part(4)), (9, "", NoRow::Obstruction)]);
+
     // The mask, the hole, and the screen without its picture stand in the way.
     let obstructions: f64 = wall.enclosure.obstructions.iter().map(Facet::area).sum();
     assert!((obstructions - (cupboard + hole + 2.0 - picture)).abs() < 1e-12, "{obstructions}");
@@ -104,8 +109,15 @@ fn masks_come_back_with_their_rows() {
     // Symmetric AᵢFᵢⱼ, rows that sum to one.
     let total: f64 = areas.iter().sum();
     let factors: Vec<f64> = (0..n * n).map(|k| areas[k % n] / total).collect();
-    let masked = wall.with_masks(&areas, &factors);
+    let errors: Vec<f32> = (0..n * n).map(|k| 1e-3 * (k + 1) as f32).collect();
+    let masked = wall.with_masks(&areas, &factors, &errors);
     let all = n + 1;
+    // What the mask and its base see of each other is certain; of the base, less is in doubt by its share that is bare.
+    let error = |i: usize, j: usize| masked.errors[i * all + j];
+    assert_eq!([error(3, 0), error(0, 3), error(3, 1), error(1, 3)], [0.0; 4]);
+    let bare = areas[0] / (areas[0] + 1.0);
+    assert!((f64::from(error(0, 1)) / (2e-3 * bare) - 1.0).abs() < 1e-6 && f64::from(error(0, 1)) >= 2e-3 * bare);
+    assert!((error(1, 2) / errors[n + 2] - 1.0).abs() < 1e-6 && error(1, 2) >= errors[n + 2]);
     assert_eq!(masked.surfaces[3].name, "cupboard");
     assert_eq!(masked.surfaces[5].name, "door");
     assert!((masked.areas[0] - areas[0] - 1.0).abs() < 1e-12 && (masked.areas[3] - 1.0).abs() < 1e-12);

@@ -9,6 +9,7 @@ use radiosity_scene::Enclosure;
 use radiosity_solve::{SolveError, script_f};
 use radiosity_transport::view_factors::{Closure, Repair, ViewFactors, view_factors};
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors};
+use serde::Serialize;
 
 /// How to find the factors of an enclosure.
 #[derive(Clone, Copy, Debug, Default)]
@@ -32,10 +33,93 @@ pub struct Factors {
     pub row_sums: [f64; 2],
     /// Largest |A_i F_ij − A_j F_ji| over the smaller area, as it was found.
     pub reciprocity: f64,
+    /// The factor with the largest stated error.
+    pub largest_error: Doubt,
+    /// Pairs of facets that are not as exact as was asked; of the adaptive method alone, which is asked.
+    pub missed: Option<Missed>,
+    /// Rows that sum to more than one by more than their errors allow: there surfaces overlap, or errors are too small.
+    pub excess: Option<Excess>,
     /// What making rows sum to one did, where that was asked for.
     pub repair: Option<Repair>,
     /// Time by stage.
     pub stages: Stages,
+}
+
+/// A factor and its stated error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Doubt {
+    /// The error.
+    pub error: f64,
+    /// The surfaces of the row and of the column.
+    pub pair: [usize; 2],
+}
+
+/// What was asked and not reached.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Missed {
+    /// Pairs of facets whose stated error is larger than asked.
+    pub pairs: usize,
+    /// The largest of them, as an error of the factor from the smaller facet, and the surfaces that the facets belong to.
+    pub largest: Doubt,
+    /// What was asked.
+    pub asked: f64,
+}
+
+/// Rows that sum to more than one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Excess {
+    /// How many do.
+    pub rows: usize,
+    /// The worst of them.
+    pub row: usize,
+    /// Its sum.
+    pub sum: f64,
+    /// The sum of its stated errors.
+    pub errors: f64,
+}
+
+/// Sums above one that are no news: rounding of a row of some million factors.
+const ROUNDING: f64 = 1e-9;
+
+impl Missed {
+    fn of(found: &ViewFactors, enclosure: &Enclosure, asked: f64) -> Option<Missed> {
+        let (areas, surface) = (found.areas(), |facet: usize| enclosure.surface_of[facet] as usize);
+        // Errors are stored in single precision, rounded up.
+        let bound = asked * (1.0 + 4.0 * f64::from(f32::EPSILON));
+        let (mut pairs, mut largest) = (0, Doubt::default());
+        for (i, j, _, error) in found.entries() {
+            let (small, large) = if areas[i] <= areas[j] { (i, j) } else { (j, i) };
+            let error = error / areas[small];
+            pairs += usize::from(error > bound);
+            if error > largest.error {
+                largest = Doubt { error, pair: [surface(small), surface(large)] };
+            }
+        }
+        (pairs > 0).then_some(Missed { pairs, largest, asked })
+    }
+}
+
+impl Excess {
+    fn of(factors: &FormFactors) -> Option<Excess> {
+        let mut found: Option<Excess> = None;
+        for row in 0..factors.len() {
+            let (sum, errors) = factors.row(row).fold((0.0, 0.0), |(s, e), (_, value, error)| (s + value, e + error));
+            let over = sum - errors - 1.0;
+            if over > ROUNDING {
+                let worst = found.filter(|worst| worst.sum - worst.errors - 1.0 >= over);
+                let rows = found.map_or(0, |found| found.rows) + 1;
+                found = Some(worst.map_or(Excess { rows, row, sum, errors }, |worst| Excess { rows, ..worst }));
+            }
+        }
+        found
+    }
+}
+
+/// The factor with the largest stated error.
+fn largest_error(factors: &FormFactors) -> Doubt {
+    let entries = (0..factors.len()).flat_map(|i| factors.row(i).map(move |(j, _, error)| ([i, j], error)));
+    entries
+        .fold(Doubt::default(), |worst, (pair, error)| if error > worst.error { Doubt { error, pair } } else { worst })
 }
 
 /// Finds the factors between the surfaces of an enclosure.
@@ -66,16 +150,20 @@ pub fn factors(enclosure: &Enclosure, options: &FactorsOptions, monitor: &dyn Mo
         let found = stages
             .time(monitor, "form factors", || FormFactors::new(options.method, enclosure, &options.form, &watch))?
             .by_surface(enclosure);
-        let (closure, row_sums, reciprocity) = (found.closure(), range(&found.row_sums()), found.reciprocity());
-        return Ok(Factors { factors: found, closure, row_sums, reciprocity, repair: None, stages });
+        let reciprocity = found.reciprocity();
+        return Ok(Factors::of(found, reciprocity, stages));
     }
     let found = stages.time(monitor, "form factors", || view_factors(enclosure, &options.form.adaptive, &watch))?;
+    let missed = Missed::of(&found, enclosure, options.form.adaptive.accuracy);
     let mut found: ViewFactors =
         if enclosure.surfaces.len() == enclosure.facets.len() { found } else { found.by_surface(enclosure) };
-    let (closure, row_sums) = (found.closure(), range(&found.row_sums()));
-    let repair = options.close.then(|| stages.time(monitor, "closing", || found.repair()));
     // Stored once for both directions.
-    Ok(Factors { factors: found.into(), closure, row_sums, reciprocity: 0.0, repair, stages })
+    if !options.close {
+        return Ok(Factors { missed, ..Factors::of(found.into(), 0.0, stages) });
+    }
+    let raw = Factors { missed, ..Factors::of(found.clone().into(), 0.0, stages) };
+    let repair = raw.stages.time(monitor, "closing", || found.repair());
+    Ok(Factors { factors: found.into(), repair: Some(repair), ..raw })
 }
 
 fn range(sums: &[f64]) -> [f64; 2] {
@@ -83,11 +171,74 @@ fn range(sums: &[f64]) -> [f64; 2] {
 }
 
 impl Factors {
+    /// Factors as they were found, and what they say of themselves.
+    fn of(factors: FormFactors, reciprocity: f64, stages: Stages) -> Factors {
+        Factors {
+            closure: factors.closure(),
+            row_sums: range(&factors.row_sums()),
+            reciprocity,
+            largest_error: largest_error(&factors),
+            missed: None,
+            excess: Excess::of(&factors),
+            repair: None,
+            stages,
+            factors,
+        }
+    }
+
     /// Script-F of the surfaces, row by row: the exchange with all reflections by the emittances in it.
     ///
     /// # Errors
     /// [`SolveError`] as of [`script_f`].
     pub fn script_f(&self, emittances: &[f64]) -> Result<Vec<f64>, SolveError> {
         script_f(&self.factors.dense(), emittances)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use radiosity_scene::Facet;
+
+    fn square(low: [f64; 3], side: f64) -> Facet {
+        let at = |x: f64, y: f64| [low[0] + x, low[1] + y, low[2]].into();
+        Facet::new(vec![at(0., 0.), at(side, 0.), at(side, side), at(0., side)]).unwrap()
+    }
+
+    fn plates() -> Enclosure {
+        let mut plates = Enclosure::default();
+        plates.add("floor", square([0.0; 3], 1.0));
+        plates.add("ceiling", square([0.0, 0.0, 1.0], 1.0).flipped());
+        plates.obstructions.push(square([0.21, 0.34, 0.5], 0.4));
+        plates
+    }
+
+    fn with_accuracy(accuracy: f64) -> Factors {
+        let mut options = FactorsOptions::default();
+        options.form.adaptive.accuracy = accuracy;
+        factors(&plates(), &options, &()).unwrap()
+    }
+
+    /// It was kept silent.
+    #[test]
+    fn an_accuracy_that_is_not_reached_is_told_with_its_pair() {
+        let reached = with_accuracy(1e-4);
+        assert_eq!(reached.missed, None, "{:?}", reached.largest_error);
+        assert!(reached.largest_error.error > 0.0 && reached.largest_error.error < 1.001e-4);
+        let missed = with_accuracy(1e-30).missed.expect("no sum of doubles is as exact");
+        assert_eq!((missed.pairs, missed.asked), (1, 1e-30));
+        assert!(missed.largest.error > 1e-30 && missed.largest.pair[0] + missed.largest.pair[1] == 1, "{missed:?}");
+    }
+
+    /// Two floors in one place, each seen whole.
+    #[test]
+    fn rows_of_surfaces_that_overlap_sum_to_too_much() {
+        let mut box_ = Enclosure::default();
+        box_.add("floor", square([0.0; 3], 1.0));
+        box_.add("above", square([0.0, 0.0, 0.01], 1.0).flipped());
+        assert_eq!(factors(&box_, &FactorsOptions::default(), &()).unwrap().excess, None);
+        box_.add("again", square([0.0; 3], 1.0));
+        let excess = factors(&box_, &FactorsOptions::default(), &()).unwrap().excess.unwrap();
+        assert!(excess.rows == 1 && excess.row == 1 && excess.sum > 1.9, "{excess:?}");
     }
 }

@@ -39,7 +39,7 @@ pub use bake::{BakeOptions, Baked, bake};
 pub use compare::{CompareOptions, Comparison, compare};
 pub use cornell::cornell_box;
 pub use error::Error;
-pub use factors::{Factors, FactorsOptions, factors};
+pub use factors::{Doubt, Excess, Factors, FactorsOptions, Missed, factors};
 pub use judge::WrittenRound;
 pub use lightmap::{Lightmap, TEXEL_BYTES, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};

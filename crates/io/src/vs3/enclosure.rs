@@ -34,12 +34,36 @@ pub struct Mask {
     pub row: usize,
 }
 
+/// A surface of the file that has no row of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rowless {
+    /// Its number in the file.
+    pub number: u32,
+    /// Its name; an obstruction has none.
+    pub name: String,
+    /// Why.
+    pub why: NoRow,
+}
+
+/// Why a surface has no row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoRow {
+    /// It only stands in the way.
+    Obstruction,
+    /// A null surface: what it covers of its base, the surface of the enclosure, is no part of that and lets nothing
+    /// through.
+    Null(usize),
+    /// It is combined with a surface of the enclosure.
+    Part(usize),
+}
+
 /// What the surfaces make.
 #[derive(Debug, Default)]
 pub(super) struct Built {
     pub enclosure: Enclosure,
     pub numbers: Vec<u32>,
     pub masks: Vec<Mask>,
+    pub rowless: Vec<Rowless>,
 }
 
 /// Makes an enclosure of surfaces, as far as they are right. Of the numbers in `unreadable` there are lines with errors.
@@ -79,6 +103,15 @@ pub(super) fn build(surfaces: &[Surface], unreadable: &FxHashSet<u32>, report: &
     let surface_of = |i: usize| index_of[wholes[i].unwrap_or(i)];
     for mask in &mut built.masks {
         mask.base = bases[mask.base].and_then(surface_of).unwrap_or_default();
+    }
+    for (i, Surface { kind, number, name, .. }) in surfaces.iter().enumerate() {
+        let why = match kind {
+            Kind::Obstruction => NoRow::Obstruction,
+            Kind::Null => NoRow::Null(bases[i].and_then(surface_of).unwrap_or_default()),
+            Kind::Radiating if index_of[i].is_none() => NoRow::Part(surface_of(i).unwrap_or_default()),
+            Kind::Radiating | Kind::Mask => continue,
+        };
+        built.rowless.push(Rowless { number: *number, name: name.clone(), why });
     }
     for (i, (surface, pieces)) in surfaces.iter().zip(pieces).enumerate() {
         if surface.kind == Kind::Radiating {

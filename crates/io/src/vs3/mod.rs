@@ -20,7 +20,7 @@ mod report;
 mod settings;
 mod surface;
 
-pub use enclosure::Mask;
+pub use enclosure::{Mask, NoRow, Rowless};
 pub use settings::Settings;
 
 use crate::LoadError;
@@ -44,6 +44,8 @@ pub struct Vs3 {
     pub numbers: Vec<u32>,
     /// Masking surfaces, in the order of the file; no part of the enclosure.
     pub masks: Vec<Mask>,
+    /// The surfaces of the file that have no row, in its order.
+    pub rowless: Vec<Rowless>,
     /// What the file asks of View3D.
     pub settings: Settings,
     /// What is doubtful.
@@ -59,17 +61,20 @@ pub struct Masked {
     pub areas: Vec<f64>,
     /// Form factors, row by row.
     pub factors: Vec<f64>,
+    /// Bounds of their errors; what masks and their bases see of each other is certain.
+    pub errors: Vec<f32>,
 }
 
 impl Vs3 {
-    /// Adds the masks to the enclosure's areas and form factors (row by row), as View3D reports them: a mask sees its base
+    /// Adds the masks to the enclosure's areas and form factors with their errors (row by row), as View3D reports them: a mask sees its base
     /// only, and the base sees its masks with what they cover.
     ///
     /// # Panics
-    /// Where `areas` or `factors` are not of this enclosure.
-    pub fn with_masks(&self, areas: &[f64], factors: &[f64]) -> Masked {
+    /// Where `areas`, `factors` or `errors` are not of this enclosure.
+    pub fn with_masks(&self, areas: &[f64], factors: &[f64], errors: &[f32]) -> Masked {
         let n = self.enclosure.surfaces.len();
         assert_eq!((areas.len(), factors.len()), (n, n * n), "areas and factors of {n} surfaces");
+        assert_eq!(errors.len(), n * n, "errors of {n} surfaces");
         let all = n + self.masks.len();
         let mut rows: Vec<usize> = (0..all).collect();
         rows.retain(|row| !self.masks.iter().any(|mask| mask.row == *row));
@@ -78,6 +83,7 @@ impl Vs3 {
             surfaces: vec![EnclosureSurface::default(); all],
             areas: vec![0.0; all],
             factors: vec![0.0; all * all],
+            errors: vec![0.0; all * all],
         };
         for (i, row) in rows.iter().enumerate() {
             masked.surfaces[*row] = self.enclosure.surfaces[i].clone();
@@ -93,6 +99,9 @@ impl Vs3 {
             let bare = areas[i] / masked.areas[*row];
             for (j, column) in rows.iter().enumerate() {
                 masked.factors[row * all + column] = factors[i * n + j] * bare;
+                // A bound stays one: that of the bare part bounds its share of the whole, rounded up.
+                let error = f64::from(errors[i * n + j]) * bare;
+                masked.errors[row * all + column] = if error > 0.0 { (error as f32).next_up() } else { 0.0 };
             }
         }
         for mask in &self.masks {
@@ -184,7 +193,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], metres_per_unit: f64) -> Result<Vs3
         report.warning(first.line, what, "matters only where emittances are asked for");
     }
     bare.into_iter().for_each(|surface| surface.emittance = LEAST_EMITTANCE);
-    let Built { mut enclosure, numbers, masks } = build(&surfaces, &unreadable, &mut report);
+    let Built { mut enclosure, numbers, masks, rowless } = build(&surfaces, &unreadable, &mut report);
     if enclosure.surfaces.is_empty() && !report.has_errors() {
         report.error(1, "the file has no surfaces", "add a line 'S n v1 v2 v3 v4 base cmb emit name' for each");
     }
@@ -205,7 +214,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], metres_per_unit: f64) -> Result<Vs3
     if failed {
         return Err(LoadError::Faults(warnings));
     }
-    Ok(Vs3 { enclosure, numbers, masks, settings, warnings })
+    Ok(Vs3 { enclosure, numbers, masks, rowless, settings, warnings })
 }
 
 /// The text of a file in UTF-8, or else in Latin-1.
