@@ -92,7 +92,10 @@ fn what_lies_upon_a_base_is_cut_out_of_it() {
 
     // Each surface of the file that has no row is named, and why.
     let rowless: Vec<_> = wall.rowless.iter().map(|r| (r.number, r.name.as_str(), r.why)).collect();
-    assert_eq!(rowless, [(6, "hole", NoRow::Null(0)), (8, "picture", NoRow::Part(4)), (9, "", NoRow::Obstruction)]);
+    assert_eq!(
+        rowless,
+        [(6, "hole", NoRow::Null(0)), (8, "picture", NoRow::Part(4)), (9, "surface 9", NoRow::Obstruction)]
+    );
 
     // The mask, the hole, and the screen without its picture stand in the way.
     let obstructions: f64 = wall.enclosure.obstructions.iter().map(Facet::area).sum();

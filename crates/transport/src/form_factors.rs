@@ -122,7 +122,7 @@ pub struct FormFactors {
     pub columns: Vec<u32>,
     /// F_ij.
     pub values: Vec<f64>,
-    /// Bounds of the errors.
+    /// Bounds of the errors; also of factors that were found to be zero and may not be.
     pub errors: Vec<f32>,
     /// Share of the hemisphere that a row method looks at, by row; empty for others.
     pub captured: Vec<f64>,
@@ -180,7 +180,7 @@ impl FormFactors {
             for (j, (value, error)) in row.filter(|(_, (value, error))| *value != 0.0 || *error != 0.0) {
                 factors.columns.push(j as u32);
                 factors.values.push(value);
-                factors.errors.push(error as f32);
+                factors.errors.push(round_up(error));
             }
             factors.starts.push(factors.columns.len());
         }
@@ -235,7 +235,17 @@ impl FormFactors {
     /// # Errors
     /// [`SolveError`] if a factor or an area is no finite number.
     pub fn transport(&self) -> Result<SparseTransport<f64>, SolveError> {
-        SparseTransport::new(self.areas.clone(), self.starts.clone(), self.columns.clone(), self.values.clone())
+        // Entries that are zero and may err are of no use here.
+        let mut starts = vec![0];
+        let (mut columns, mut values) = (Vec::new(), Vec::new());
+        for i in 0..self.len() {
+            for (j, value, _) in self.row(i).filter(|(_, value, _)| *value != 0.0) {
+                columns.push(j as u32);
+                values.push(value);
+            }
+            starts.push(columns.len());
+        }
+        SparseTransport::new(self.areas.clone(), starts, columns, values)
     }
 
     /// All factors, row by row: N × N.
@@ -268,7 +278,7 @@ impl FormFactors {
             for (column, (value, error)) in row {
                 factors.columns.push(column);
                 factors.values.push(value);
-                factors.errors.push(error as f32);
+                factors.errors.push(round_up(error));
             }
             factors.starts.push(factors.columns.len());
         }
@@ -282,6 +292,12 @@ impl From<ViewFactors> for FormFactors {
         let (areas, choices) = (found.areas().to_vec(), Some(found.choices));
         FormFactors { areas, starts, columns, values, errors, captured: Vec::new(), choices }
     }
+}
+
+/// Single precision, never below: a bound stays one.
+fn round_up(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
 }
 
 /// Every pair by one method, each direction for itself: what they are off from reciprocity is theirs.

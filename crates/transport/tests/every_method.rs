@@ -153,8 +153,7 @@ fn catalogue_22_surfaces_add_up() {
 }
 
 /// Catalogue 91: around a block, every two methods that see occlusion agree within the sum of their stated errors, points drawn
-/// at random within twice that. Rows look from few points, and what is hidden from all of these they do not know of: such
-/// entries are left out, and together take less than 3 % of a row.
+/// at random within twice that, also in what is hidden from all points that rows look from.
 #[test]
 fn catalogue_91_every_method_that_sees_occlusion() {
     let room = room_with_block(1);
@@ -169,8 +168,6 @@ fn catalogue_91_every_method_that_sees_occlusion() {
     });
     let all: Vec<(FormFactorMethod, Vec<(f64, f64)>)> = all.collect();
     assert!(all.len() >= 13);
-    let unknown =
-        |method: FormFactorMethod, entry: (f64, f64)| matches!(method, FormFactorMethod::Row(_)) && entry.0 == 0.0;
     for (a, (method, one)) in all.iter().enumerate() {
         for (other, two) in &all[..a] {
             let drawn = is_random(*method)
@@ -178,16 +175,10 @@ fn catalogue_91_every_method_that_sees_occlusion() {
                 || method.name() == "hemisphere"
                 || other.name() == "hemisphere";
             let scale = if drawn { 2.0 } else { 1.0 };
-            let mut missed = vec![0.0; n];
             for (k, (x, y)) in one.iter().zip(two).enumerate() {
-                if unknown(*method, *x) || unknown(*other, *y) {
-                    missed[k / n] += (x.0 - y.0).abs();
-                    continue;
-                }
                 let off = (x.0 - y.0).abs();
                 assert!(off <= scale * (x.1 + y.1) + 1e-12, "{}, {}: {method} {x:?}, {other} {y:?}", k / n, k % n);
             }
-            assert!(missed.iter().all(|m| *m < 0.03), "{method} {other}: {missed:?}");
         }
     }
 }

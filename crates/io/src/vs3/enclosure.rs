@@ -39,7 +39,7 @@ pub struct Mask {
 pub struct Rowless {
     /// Its number in the file.
     pub number: u32,
-    /// Its name; an obstruction has none.
+    /// Its name.
     pub name: String,
     /// Why.
     pub why: NoRow,

@@ -205,10 +205,15 @@ fn make(
             let factors =
                 FormFactors::new(method, &problem.enclosure, &Contender::options(setting, problem.memory), progress)?;
             let bytes = factors.starts.len() * size_of::<usize>()
-                + factors.values.len() * (size_of::<f64>() + size_of::<u32>() + size_of::<f32>());
+                + seen(&factors) * (size_of::<f64>() + size_of::<u32>() + size_of::<f32>());
             Ok((factors, None, bytes))
         }
     }
+}
+
+/// Factors that are not zero.
+fn seen(factors: &FormFactors) -> usize {
+    factors.values.iter().filter(|value| **value != 0.0).count()
 }
 
 /// Places and shadow rays of the engine's direct light by element, for its default number of rays; they go with these.
@@ -284,7 +289,7 @@ pub(super) fn judge(
         solve_seconds,
         factor_share: seconds / (seconds + solve_seconds),
         bytes,
-        entries: factors.values.len(),
+        entries: seen(&factors),
         samples,
         closure: factors.closure(),
         row_sum_error: difference.row_sums,
@@ -396,7 +401,7 @@ impl Difference {
     }
 }
 
-/// Calls back with j, value and error of F_ij by both, for all j that either has in row i.
+/// Calls back with j, value and error of F_ij by both, for all j that either sees in row i.
 pub(super) fn each_pair(a: &FormFactors, b: &FormFactors, i: usize, mut visit: impl FnMut(usize, [f64; 2], [f64; 2])) {
     let (mut left, mut right) = (a.row(i).peekable(), b.row(i).peekable());
     loop {
@@ -408,6 +413,8 @@ pub(super) fn each_pair(a: &FormFactors, b: &FormFactors, i: usize, mut visit: i
         };
         let own = left.next_if(|x| x.0 == column).map_or([0.0; 2], |(_, value, error)| [value, error]);
         let other = right.next_if(|y| y.0 == column).map_or([0.0; 2], |(_, value, error)| [value, error]);
-        visit(column, own, other);
+        if own[0] != 0.0 || other[0] != 0.0 {
+            visit(column, own, other);
+        }
     }
 }

@@ -10,10 +10,13 @@
 //! - *Proximity*: a few points stand for the whole facet. One point is compared with 2 × 2 others at half the
 //!   resolution, which costs as many cells again; k × k with half as many each way, which is off by at least twice as
 //!   much, as errors fall with h² and beside edges of shadows with h. Facets nearer than the points are to each other
-//!   may escape both, so Lambert's integral is asked about them at more points, as if nothing hid them.
+//!   may escape both, so Lambert's integral is asked about them at more points, as if nothing hid them. Facets that show
+//!   from no point may show from between them: half a spacing along a side of the facet, at most, if one straight edge of
+//!   shadow is what hides them.
 //! - *Truncation*: where the surface does not go down to the horizon.
 //!
-//! All of these watch what is seen: an obstacle that shows in no cell from any eye point stays unknown.
+//! All of these watch what is seen: an obstacle that shows in no cell from any eye point stays unknown, and so does a gap
+//! between two obstacles that is narrower than the eye points are apart.
 
 use super::glance::{Eye, Observer, Scratch, Tally};
 use super::points::eye_points;
@@ -21,9 +24,10 @@ use super::surface::{Atlas, Projection};
 use super::view::View;
 use super::{Row, RowFactors, RowMatrix};
 use crate::pair::Factor;
+use crate::pair::exact::exact;
 use crate::{Progress, Stopped};
 use glam::DVec3;
-use radiosity_scene::Enclosure;
+use radiosity_scene::{Enclosure, Facet};
 use radiosity_trace::sampling::{frame, hash, unit};
 
 /// How a row is looked at.
@@ -87,6 +91,49 @@ pub(super) struct Average {
     captured: f64,
 }
 
+/// The parts of a facet that lie between its eye points.
+struct Between<'a> {
+    view: &'a View<'a>,
+    from: usize,
+    /// Points in these parts.
+    points: Vec<(DVec3, f64)>,
+    /// Largest share of the facet that a straight edge of shadow can cut off without an eye point in it.
+    strip: f64,
+}
+
+impl<'a> Between<'a> {
+    /// Of k × k eye points: they are 1/k apart, and half as far from the rim, so that a strip along a side holds none that
+    /// is narrower than 1/2k of the facet.
+    fn new(view: &'a View<'a>, from: usize, k: usize) -> Between<'a> {
+        let own = &view.enclosure.facets[from];
+        Between { view, from, points: eye_points(own, 2 * k), strip: 0.5 / k as f64 }
+    }
+
+    /// The most that a facet may take which shows from no eye point: as much as from the points that would see most of it
+    /// if nothing stood in the way, over the share of the strip. Where none would, its front looks past all of them at the
+    /// rim, and all that it would take is as little.
+    fn most(&self, j: usize) -> f64 {
+        let (own, other) = (&self.view.enclosure.facets[self.from], &self.view.enclosure.facets[j]);
+        let faces = |a: &Facet, b: &Facet| b.corners().iter().any(|c| a.height(*c) > 0.0);
+        if self.from == j || !faces(own, other) || !faces(other, own) {
+            return 0.0;
+        }
+        let seen = |(eye, share): &(DVec3, f64)| (self.view.potential(*eye, own.normal(), j, ROUGH), *share);
+        let mut seen: Vec<(f64, f64)> = self.points.iter().map(seen).collect();
+        seen.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        if seen.first().is_none_or(|(potential, _)| *potential == 0.0) {
+            return exact(own, other) / own.area();
+        }
+        let mut left = self.strip;
+        let take = |(potential, share): (f64, f64)| {
+            let share = share.min(left);
+            left -= share;
+            share * potential
+        };
+        seen.into_iter().map(take).sum()
+    }
+}
+
 /// A row in the making.
 pub(super) struct Gaze<'a> {
     pub atlas: &'a Atlas<'a>,
@@ -117,7 +164,11 @@ impl<'a> Gaze<'a> {
             let find = |k: usize, level: usize| &known.iter().find(|(key, _)| *key == (k, level)).expect("just made").1;
             let average = find(k, level);
             let (other, scale) = if k == 1 { (find(2, 0), 1.5) } else { (find(k / 2, level), 0.5) };
-            let gap = |(j, (a, b)): (usize, (&f64, &f64))| (scale * (a - b).abs()).max(self.nearness(j, k, *a));
+            let between = Between::new(self.view, self.from, k.max(2));
+            let gap = |(j, (a, b)): (usize, (&f64, &f64))| match (*a, *b) {
+                (0.0, 0.0) => between.most(j),
+                (a, b) => (scale * (a - b).abs()).max(self.nearness(j, k, a)),
+            };
             let proximity: Vec<f64> = average.values.iter().zip(&other.values).enumerate().map(gap).collect();
             if let Repair::UntilError(tolerance) = look.repair {
                 let errors = proximity.iter().zip(&average.aliasing).map(|(p, a)| [p + a, *p, *a]);
