@@ -188,7 +188,8 @@ fn table(comparison: &Comparison) -> String {
     }
     for skipped in &comparison.skipped {
         let name = format!("{} {}", skipped.method, skipped.label);
-        out += &format!("{:<44} left out: {:.0} s by estimate\n", name.trim_end(), skipped.estimated_seconds);
+        let seconds = numbers::rough(skipped.estimated_seconds.max(1e-9));
+        out += &format!("{:<44} left out: {seconds} s by estimate, too much of what was left\n", name.trim_end());
     }
     out += &format!("\n{:<19} {:>22} {:>10} {:>12}\n", "solver", "displayed error after", "1 sweep", "10 sweeps");
     for march in &comparison.marches {

@@ -81,7 +81,7 @@ fn take_away(all: &Comparison) -> String {
         ("Share of form factors", share, "in the time of form factors and solver"),
         ("Time", duration(all.seconds), &format!("of {} allowed", duration(all.budget))),
     ]);
-    section("What to take away", &format!("<ul class=\"take\">{list}</ul>{cards}"))
+    section("What to take away", &format!("<ul class=\"take\">{list}</ul>{cards}<h3>In these words</h3>{}", terms(all)))
 }
 
 /// Least and largest share of form factors in time.
@@ -124,6 +124,22 @@ fn corners(all: &Comparison) -> Option<[String; 2]> {
         percent(of_factors),
         percent(near)
     );
+    if let Some(corner) = &trial.wrong.corner {
+        let [found, exact] = corner.factors;
+        let [looking, seen] = corner.objects.each_ref().map(|name| match name.as_str() {
+            "" => "a surface".to_owned(),
+            name => format!("“{}”", escape(name)),
+        });
+        let [x, y, z] = corner.centre.map(|c| format!("{c:.3}"));
+        let side = if found > exact { "too much" } else { "too little" };
+        text += &format!(
+            " One such pair: an element of {looking} at {x}, {y}, {z}\u{a0}m and one of {seen} that meets it along an edge. From \
+             its centre the other takes {} of what it sees, on the mean over all its places {}: the hemicube has {} {side}.",
+            factor(found),
+            factor(exact),
+            percent((found / exact - 1.0).abs())
+        );
+    }
     let spread = all.trials.iter().find(|t| t.method == "hemicube" && t.label.contains("points"));
     if let Some(spread) = spread {
         text += &format!(
@@ -135,6 +151,38 @@ fn corners(all: &Comparison) -> Option<[String; 2]> {
         );
     }
     Some(["The hemicube fails in corners, not for want of cells.".to_owned(), text])
+}
+
+/// A form factor to four decimals, as tables have them.
+fn factor(f: f64) -> String {
+    format!("{f:.4}")
+}
+
+/// Words that the page cannot do without.
+fn terms(all: &Comparison) -> String {
+    let shot = number(1.0 / all.elements.max(1) as f64);
+    let terms = [
+        ("Form factor F", "the share of the light leaving one element that arrives at another".to_owned()),
+        (
+            "Light off",
+            "root mean square difference of illuminance from the exact one on the same elements, relative, by area"
+                .to_owned(),
+        ),
+        ("Sweep", "one application of F to the light: every element collects from all others once".to_owned()),
+        (
+            "Work",
+            format!("counted in sweeps; a shot, in which one element gives to all others, is one of {} parts of a sweep ({shot})", count(all.elements)),
+        ),
+        (
+            "Of full white",
+            "how far a picture is off as a display shows it, root mean square over its pixels; 100 % were white instead of \
+             black everywhere"
+                .to_owned(),
+        ),
+    ];
+    let list: String =
+        terms.iter().map(|(name, meaning)| format!("<div><dt>{name}</dt><dd>{meaning}</dd></div>")).collect();
+    format!("<dl class=\"terms\">{list}</dl>")
 }
 
 /// What the mesh costs beside what methods cost.

@@ -122,7 +122,10 @@ pub fn errors(all: &Comparison) -> String {
         "Error of light: relative root mean square difference of illuminance from the exact discrete one, by area. F off: \
          ‖F − F*‖/‖F*‖ over all entries. Covered: pairs whose stated error holds the true one. Row sums: root mean square \
          difference from the exact ones. From the truth: everything, mesh included, by the referee. Short runs are the best \
-         of three. <code>rays</code> carries bright sources apart, as the engine does; its rows need not find them.",
+         of three. <code>rays</code> carries bright sources apart, as the engine does; its rows need not find them. \
+         <code>hemicube</code> and <code>hemicube-midpoint</code> see the same through the same cells and differ in what a cell \
+         weighs: its exact factor, so that rows sum to one, or the factor at its centre times its area, as published in \
+         1985, which is off by some 10⁻⁴ with 64 cells and falls with their square.",
     );
     section(
         "Form factors: error against time",
@@ -170,7 +173,10 @@ fn trials(all: &Comparison) -> String {
         "Reciprocity off",
     ];
     let rows: Vec<Vec<String>> = all.trials.iter().enumerate().map(row).collect();
-    format!("<div class=\"trials\">{}</div>", table(&head, &rows))
+    format!(
+        "<div class=\"trials\"><p class=\"sideways\">scroll sideways for all columns →</p>{}</div>",
+        table(&head, &rows)
+    )
 }
 
 fn skipped(all: &Comparison) -> String {

@@ -50,12 +50,21 @@ pub fn take_away(all: &Comparison) -> Option<[String; 2]> {
     }
     text += ". ";
     text += &all.leads.iter().skip(1).map(lead).collect::<Vec<_>>().join(" ");
-    if let Some(c) = all.crossings.iter().find(|c| c.late == "gauss-seidel") {
+    let rivals = all.crossings.iter().find(|c| c.late == "gauss-seidel");
+    let loses_by_time = rivals.is_some_and(|c| c.seconds.is_some() && c.work.is_none_or(|work| work > 1.0));
+    if let Some(c) = rivals {
         text += &format!(" {}", crossing(c));
+        if loses_by_time {
+            text += " So shooting beats gathering by work and not by time: on stored factors a sweep runs through memory in \
+                     order and a shot does not. Where factors are made as they are needed, work is time.";
+        }
     }
     let last = all.leads.last().and_then(|lead| lead.ranks.first()).map(|best| best.0);
     let head = match last {
         None | Some(Family::Shooting) => "Shooting has the picture first, and keeps ahead.".to_owned(),
+        Some(family) if loses_by_time => {
+            format!("Shooting has the picture first by work, not by time; {} has the last digits.", family.name())
+        }
         Some(family) => format!("Shooting has the picture first, {} the last digits.", family.name()),
     };
     Some([head, text])
@@ -172,5 +181,8 @@ fn solver_table(all: &Comparison) -> String {
         "Residual",
         "Error of B",
     ];
-    format!("<div class=\"solvers\">{}</div>", table(&head, &all.marches.iter().map(row).collect::<Vec<_>>()))
+    format!(
+        "<div class=\"solvers\"><p class=\"sideways\">scroll sideways for all columns →</p>{}</div>",
+        table(&head, &all.marches.iter().map(row).collect::<Vec<_>>())
+    )
 }

@@ -30,7 +30,10 @@ pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
         format!("<tr><th scope=\"row\">{}</th>{cells}</tr>", r[0])
     };
     let rows: String = rows.iter().map(row).collect();
-    format!("<div class=\"scroll\"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>")
+    format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"table, scrolls sideways\"><table><thead><tr>{head}</tr>\
+         </thead><tbody>{rows}</tbody></table></div>"
+    )
 }
 
 /// Rows of a name, a bar and figures.

@@ -70,6 +70,53 @@ pub struct Wrong {
     pub distance_in_widths: f64,
     /// Rays or cells that the facet should have had, where they are counted.
     pub samples: Option<f64>,
+    /// The worst pair of facets that share an edge.
+    pub corner: Option<Corner>,
+}
+
+/// A facet as another sees it with which it shares an edge.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Corner {
+    /// The object of the facet that looks, and that of the one that it sees.
+    pub objects: [String; 2],
+    /// The middle of the one that looks, metres.
+    pub centre: [f64; 3],
+    /// F between them, as found and exactly.
+    pub factors: [f64; 2],
+}
+
+/// The pair with a common edge that sees each other whole and whose factor is off by most; none where facets share no
+/// edges.
+fn worst_corner(factors: &FormFactors, problem: &Problem, reference: &Reference) -> Option<Corner> {
+    let clear = clear_error(reference);
+    let row = |i: usize| {
+        let mut worst: Option<(f64, usize, usize, [f64; 2])> = None;
+        each_pair(factors, &reference.factors, i, |j, [value, _], [truth, own]| {
+            let off = (value - truth).abs();
+            let is_clear = truth > 0.0 && own * problem.area[i] <= clear * problem.area[i].min(problem.area[j]);
+            if is_clear && worst.is_none_or(|worst| off > worst.0) && share_edge(problem, i, j) {
+                worst = Some((off, i, j, [value, truth]));
+            }
+        });
+        worst
+    };
+    let rows: Vec<_> = (0..problem.len()).into_par_iter().filter_map(row).collect();
+    let first_of_worst =
+        |a: (f64, usize, usize, [f64; 2]), b: (f64, usize, usize, [f64; 2])| if b.0 > a.0 { b } else { a };
+    let (_, i, j, factors) = rows.into_iter().reduce(first_of_worst)?;
+    let centre = problem.enclosure.facets[i].centroid().to_array();
+    Some(Corner { objects: [problem.object(i), problem.object(j)], centre, factors })
+}
+
+/// Distance, in widths of a facet, at which corners are one.
+const SAME: f64 = 1e-5;
+
+/// Whether two corners of a facet are corners of the other.
+fn share_edge(problem: &Problem, i: usize, j: usize) -> bool {
+    let (a, b) = (&problem.enclosure.facets[i], &problem.enclosure.facets[j]);
+    let near = SAME * problem.area[i].sqrt();
+    let is_shared = |corner: &&DVec3| b.corners().iter().any(|other| corner.distance(*other) <= near);
+    a.corners().iter().filter(is_shared).count() >= 2
 }
 
 /// Compares rows and light with the exact ones.
@@ -115,6 +162,7 @@ pub(super) fn wrong(
         factors: pair,
         distance_in_widths: gap(problem, worst, from),
         samples: samples.map(|m| pair[1] * m as f64),
+        corner: worst_corner(factors, problem, reference),
     }
 }
 
@@ -143,6 +191,11 @@ fn to_segment(point: DVec3, a: DVec3, b: DVec3) -> f64 {
     point.distance(a + along * (b - a))
 }
 
+/// Error of an exact factor, from the smaller facet, up to which nothing hides a part: ten times what is asked of such pairs.
+fn clear_error(reference: &Reference) -> f64 {
+    10.0 * 1e-4 * reference.account.accuracy
+}
+
 /// Squared error of light, number of pairs and squared error of factors of row i by cause.
 fn shares(
     i: usize,
@@ -155,7 +208,7 @@ fn shares(
     let (normal, centre) = (facets[i].normal(), facets[i].centroid());
     // sin² of the height of a round rim that captures as much.
     let rim = 1.0 - factors.captured.get(i).copied().unwrap_or(1.0);
-    let cut = 10.0 * 1e-4 * reference.account.accuracy;
+    let cut = clear_error(reference);
     let mut sums = [[0.0; 3]; 5];
     each_pair(factors, &reference.factors, i, |j, [value, _], [truth, own]| {
         let towards = (facets[j].centroid() - centre).normalize_or_zero();

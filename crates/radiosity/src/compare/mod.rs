@@ -18,7 +18,7 @@ mod tests;
 mod trial;
 mod truth;
 
-pub use causes::{Causes, Wrong};
+pub use causes::{Causes, Corner, Wrong};
 pub use contender::{Contender, Family, Kind, Setting, UnknownContender};
 pub use growth::{Growth, Size};
 pub use look::DifferenceView;
@@ -131,7 +131,14 @@ const GROWTH: f64 = 0.15;
 /// How much of the time that is left for methods one run may take, at most: a third leaves room for the others.
 const ONE_RUN: f64 = 0.35;
 
-/// The pass in which pairs run: after two settings of rows.
+/// The same for pairs that run before second settings of others: with a tenth, formulas of some seconds were left out in a
+/// minute; three of a quarter leave four tenths for what follows.
+const QUICK_RUN: f64 = 0.25;
+
+/// What a first setting may take of the whole time, even if none is left: all of them together exceed it by a tenth or so.
+const MOMENT: f64 = 0.01;
+
+/// The pass in which other pairs run: after two settings of rows.
 const PAIRS_TURN: usize = 2;
 
 /// Meshes for growth, against the one of all, beside it.
@@ -221,7 +228,49 @@ fn refuse_too_many(tracer: &Tracer, options: &CompareOptions) -> Result<(), Erro
     Ok(())
 }
 
-/// All contenders, the coarse settings of all first.
+/// A contender's turn to run at a setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Turn {
+    /// Its place among the contenders.
+    place: usize,
+    setting: Setting,
+    /// Its first setting.
+    is_first: bool,
+    /// How much of the time that is left it may take.
+    share: f64,
+    /// If it would take more it has another turn.
+    comes_again: bool,
+}
+
+/// Who runs when: one setting of all before the second of any. Pairs have one setting, and of these some are over in a
+/// moment and others never; those that are not quick get their turn after two settings of rows.
+fn turns(methods: &[Contender]) -> Vec<Turn> {
+    let is_pair = |contender: &Contender| contender.kind() == Kind::Pair;
+    let passes = methods.iter().map(|contender| contender.settings().len()).max().unwrap_or(0);
+    let mut turns = Vec::new();
+    for pass in 0..passes.max(PAIRS_TURN + 1) {
+        let mut add = |place: usize, contender: &Contender, pairs: bool| {
+            if is_pair(contender) != pairs {
+                return;
+            }
+            let (number, share, comes_again) = match pairs {
+                true if pass == 0 => (0, QUICK_RUN, true),
+                true if pass == PAIRS_TURN => (0, ONE_RUN, false),
+                true => return,
+                false => (pass, ONE_RUN, false),
+            };
+            if let Some(setting) = contender.settings().get(number) {
+                turns.push(Turn { place, setting: *setting, is_first: number == 0, share, comes_again });
+            }
+        };
+        for pairs in [false, true] {
+            methods.iter().enumerate().for_each(|(place, contender)| add(place, contender, pairs));
+        }
+    }
+    turns
+}
+
+/// All contenders, one setting of each first.
 fn run(
     options: &CompareOptions,
     problem: &Problem,
@@ -233,34 +282,40 @@ fn run(
     let mut trials: Vec<(usize, Trial)> = Vec::new();
     let mut skipped = Vec::new();
     let mut is_out = vec![false; options.methods.len()];
-    // Pairs have one setting, and most cost so much that rows go before them.
-    let turn = |contender: &Contender| if contender.kind() == Kind::Pair { PAIRS_TURN } else { 0 };
-    let last = |contender: &Contender| turn(contender) + contender.settings().len();
-    let passes = options.methods.iter().map(last).max().unwrap_or(0);
-    let setting = |contender: &Contender, pass: usize| {
-        let place = pass.checked_sub(turn(contender))?;
-        contender.settings().get(place).copied()
-    };
-    for pass in 0..passes {
-        for (place, contender) in options.methods.iter().enumerate() {
-            let Some(setting) = setting(contender, pass).filter(|_| !is_out[place]) else { continue };
-            // As exact as the reference, it would be compared with itself.
-            if matches!(setting, Setting::Accuracy(bound) if bound <= reference.account.accuracy) {
-                continue;
-            }
-            monitor.stage(format!("{contender} {setting}").trim_end());
-            let allowed = ONE_RUN * left();
-            match trial::attempt(*contender, setting, problem, allowed, monitor)? {
-                Attempt::Done(made) => {
-                    let trial = trial::judge((*contender, setting), *made, problem, reference, from_truth, monitor)?;
-                    trials.push((place, trial));
+    // Seconds that a pair method is known to take.
+    let mut known: Vec<Option<f64>> = vec![None; options.methods.len()];
+    for Turn { place, setting, is_first, share, comes_again } in turns(&options.methods) {
+        // As exact as the reference, it would be compared with itself.
+        let is_reference = matches!(setting, Setting::Accuracy(bound) if bound <= reference.account.accuracy);
+        if is_out[place] || is_reference {
+            continue;
+        }
+        let contender = options.methods[place];
+        let mut allowed = share * left();
+        if is_first {
+            allowed = allowed.max(MOMENT * options.seconds);
+        }
+        let too_slow = match known[place].filter(|seconds| *seconds > allowed) {
+            Some(seconds) => seconds,
+            None => {
+                monitor.stage(format!("{contender} {setting}").trim_end());
+                match trial::attempt(contender, setting, problem, allowed, monitor)? {
+                    Attempt::Done(made) => {
+                        let trial = trial::judge((contender, setting), *made, problem, reference, from_truth, monitor)?;
+                        trials.push((place, trial));
+                        is_out[place] = setting == Setting::Only;
+                        continue;
+                    }
+                    Attempt::TooSlow(seconds) => seconds,
                 }
-                Attempt::TooSlow(estimated_seconds) => {
-                    // Finer ones would be slower still, unless it was for its many eye points.
-                    is_out[place] = !matches!(setting, Setting::Cells { points: 2.., .. });
-                    skipped.push(Skipped { method: contender.name(), label: setting.to_string(), estimated_seconds });
-                }
             }
+        };
+        known[place] = comes_again.then_some(too_slow);
+        if !comes_again {
+            // Finer ones would be slower still, unless it was for its many eye points.
+            is_out[place] = !matches!(setting, Setting::Cells { points: 2.., .. });
+            let (method, label) = (contender.name(), setting.to_string());
+            skipped.push(Skipped { method, label, estimated_seconds: too_slow });
         }
     }
     // Several eye points make a curve of their own.
