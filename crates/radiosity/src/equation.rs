@@ -52,18 +52,26 @@ impl Matrix {
 /// Parts that a solver's way is told in.
 const PARTS: usize = 1000;
 
+/// What the work alone can tell of the way: at its end it was not enough.
+const MOST_BY_WORK: f64 = 0.9;
+
 /// How far a solver is on its way to the tolerance, by its residual: that of steps falls by a factor at a time, that of
-/// random runs with the root of their number.
+/// random runs with the root of their number. Shooting in advance leaves the residual as it is for some sweeps; by then
+/// the work tells, of which light with a mean reflectance ρ needs ln(tolerance)/ln ρ sweeps.
 struct Way {
     is_random: bool,
     tolerance: f64,
+    sweeps: f64,
     first: Option<f64>,
     done: usize,
 }
 
 impl Way {
-    fn new(is_random: bool, tolerance: f64) -> Way {
-        Way { is_random, tolerance, first: None, done: 0 }
+    fn new(is_random: bool, tolerance: f64, reflectance: &[f64]) -> Way {
+        let mean = reflectance.iter().sum::<f64>() / reflectance.len().max(1) as f64;
+        // Light that hardly comes to rest is expected to take a hundred sweeps or so.
+        let sweeps = tolerance.ln() / mean.clamp(0.1, 0.9).ln();
+        Way { is_random, tolerance, sweeps, first: None, done: 0 }
     }
 
     /// Parts of [`PARTS`] done, never fewer than before, as a residual may rise for a while.
@@ -75,7 +83,8 @@ impl Way {
         } else if self.is_random {
             (self.tolerance / residual).powi(2)
         } else {
-            (first / residual).ln() / (first / self.tolerance).ln()
+            let by_residual = (first / residual).ln() / (first / self.tolerance).ln();
+            by_residual.max((info.work / self.sweeps).min(MOST_BY_WORK))
         };
         // The cast saturates, and makes no number zero.
         self.done = self.done.max((share * PARTS as f64).round() as usize).min(PARTS);
@@ -91,7 +100,7 @@ pub(crate) fn solve(
     (solver, params): (Solver, &Params),
     monitor: &dyn Monitor,
 ) -> Result<Info, Error> {
-    let mut way = Way::new(solver.is_random(), params.tolerance);
+    let mut way = Way::new(solver.is_random(), params.tolerance, &response.reflectance);
     let step = |_: &[f64], info: &Info| {
         let go = monitor.step(way.done(info), PARTS);
         if go { Go::On } else { Go::Stop }
@@ -121,9 +130,13 @@ mod tests {
     #[test]
     fn the_way_of_a_solver_is_told_by_its_residual() {
         let at = |residual: f64| Info { residual: vec![0.1 * residual, residual], ..Info::default() };
-        let mut steps = Way::new(false, 1e-4);
+        let mut steps = Way::new(false, 1e-4, &[0.5; 3]);
         assert_eq!([1.0, 1e-1, 1e-2, 1e-1, 1e-3, 1e-5].map(|r| steps.done(&at(r))), [0, 250, 500, 500, 750, 1000]);
-        let mut random = Way::new(true, 1e-2);
+        // ½¹⁰ is a thousandth: ten sweeps, of which five are half the way, although the residual has not moved.
+        let mut stuck = Way::new(false, 0.5f64.powi(10), &[0.5; 3]);
+        let after = |work: f64| Info { work, residual: vec![1.0], ..Info::default() };
+        assert_eq!([0.0, 5.0, 8.0, 20.0].map(|work| stuck.done(&after(work))), [0, 500, 800, 900]);
+        let mut random = Way::new(true, 1e-2, &[0.5; 3]);
         assert_eq!([1.0, 0.1, 0.02, 0.005].map(|r| random.done(&at(r))), [0, 10, 250, 1000]);
     }
 

@@ -205,7 +205,7 @@ fn make(
             let factors =
                 FormFactors::new(method, &problem.enclosure, &Contender::options(setting, problem.memory), progress)?;
             let bytes = factors.starts.len() * size_of::<usize>()
-                + seen(&factors) * (size_of::<f64>() + size_of::<u32>() + size_of::<f32>());
+                + factors.values.len() * (size_of::<f64>() + size_of::<u32>() + size_of::<f32>());
             Ok((factors, None, bytes))
         }
     }
