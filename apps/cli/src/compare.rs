@@ -161,7 +161,16 @@ fn table(comparison: &Comparison) -> String {
         true => percent(audit.error),
         false => format!("less than {}", percent(audit.upper)),
     };
-    let mut out = format!(
+    let reference = &comparison.reference;
+    let missed = match misses_accuracy(comparison) {
+        true => format!(
+            "warning: the exact factors were asked for {:e} and state errors up to {:.1e}\n",
+            reference.accuracy, reference.largest_stated_error
+        ),
+        false => String::new(),
+    };
+    let mut out = missed;
+    out += &format!(
         "{} elements: exact discrete light is {} from the truth, the engine by itself {}\n\n{:<19} {:<24} {:>9} {:>9} {:>10} {:>10} {:>9}\n",
         comparison.elements,
         audited(&comparison.truth.constant),
@@ -198,6 +207,14 @@ fn table(comparison: &Comparison) -> String {
     }
     out.truncate(out.trim_end().len());
     out
+}
+
+/// How much larger than asked a stated error may be before anybody is told: what is judged here is far further off.
+const A_LITTLE: f64 = 1.1;
+
+/// Whether the exact factors are less exact than was asked.
+pub fn misses_accuracy(comparison: &Comparison) -> bool {
+    comparison.reference.largest_stated_error > A_LITTLE * comparison.reference.accuracy
 }
 
 /// The last, and so finest, trial of each method.

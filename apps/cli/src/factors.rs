@@ -384,7 +384,7 @@ fn warnings(input: &Input, found: &Factors) -> Vec<String> {
     if let Some(missed) = &found.missed {
         let [from, to] = missed.largest.pair;
         lines.push(format!(
-            "warning: the accuracy of {:e} was not reached: {} stated with larger errors, {:.1e} at most, from {} to {} \
+            "warning: the accuracy of {:e} was not reached: {} stated with larger errors, {:.2e} at most, from {} to {} \
              (cut large surfaces into pieces, or allow more)",
             missed.asked,
             counted(missed.pairs, "pair of facets is", "pairs of facets are"),

@@ -57,7 +57,7 @@ pub fn load_enclosure(path: &Path, options: &LoadOptions, grouping: Grouping) ->
         let faults = std::mem::take(&mut vs3.warnings);
         return Ok(LoadedEnclosure { enclosure, vs3: Some(vs3), faults });
     }
-    let file = path.file_name().map_or_else(|| path.as_os_str(), |name| name).to_string_lossy();
+    let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     if path.is_dir() {
         return Err(LoadError::one(file, "is a folder", "name the .vs3, .glb, .gltf or .obj in it"));
     }

@@ -7,7 +7,7 @@ use super::compare_solvers as solvers;
 use super::markup::{cards, count, duration, escape, note, number, percent, plural, section, table, with_unit};
 use super::{STYLE, quoted};
 use crate::Failure;
-use crate::compare::{Account, finest};
+use crate::compare::{Account, finest, misses_accuracy};
 use radiosity::Audit;
 use radiosity::compare::{Comparison, Contender, Kind, Trial};
 use std::path::Path;
@@ -300,6 +300,15 @@ fn ground(all: &Comparison) -> String {
             "Accuracy",
             number(r.accuracy),
             "bound asked of each factor of a pair that is partly hidden; 10⁻⁴ of it for others",
+        ),
+        (
+            "Largest stated error",
+            number(r.largest_stated_error),
+            if misses_accuracy(all) {
+                "of a factor: the accuracy asked was NOT reached everywhere"
+            } else {
+                "of a factor: what was asked is reached"
+            },
         ),
         ("Uncertainty", percent(r.uncertainty), "how much light changed from ten times looser factors; less is left"),
         ("Residual", number(r.residual), "of B by conjugate gradients, relative"),

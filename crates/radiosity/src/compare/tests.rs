@@ -178,9 +178,9 @@ fn room_with_plate() -> Scene {
 }
 
 /// Whatever surface is projected on, and however pairs are integrated, factors are the same within the sum of what the
-/// methods state as their errors, past something that stands between. But three standard errors are no proof, and what no eye
-/// point saw of a facet is not in its doubts: one pair in fifty may be off by more, one in twenty with the single plane,
-/// which does not doubt what hides below its rim.
+/// methods state as their errors, past something that stands between. But three standard errors are no proof, nor is
+/// what a straight edge would show between eye points: one pair in fifty may be off by more, one in twenty with the single
+/// plane, which does not doubt what hides below its rim.
 #[test]
 fn catalogue_91_all_methods_agree_within_their_stated_errors() {
     let scene = room_with_plate();
