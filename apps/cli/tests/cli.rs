@@ -722,6 +722,18 @@ fn factors_refuse_what_makes_no_sense() {
     assert_eq!(room.names(), ["broken.vs3", "squares.vs3"]);
 }
 
+/// Whoever chose `exact` by its name had light go through furniture.
+#[test]
+fn help_names_the_methods_that_see_no_occlusion() {
+    let room = Room::new("help");
+    for verb in ["factors", "bake"] {
+        let help = room.run([verb, "--help"]).out;
+        let words: Vec<&str> = help.split_whitespace().collect();
+        let words = words.join(" ");
+        assert!(words.contains("`contour` and `exact` do not see what stands between"), "{verb}: {words}");
+    }
+}
+
 /// A wall with a mask, a null surface and a combined one, a plate before it, and the opposite wall.
 const WALL: &str = "T wall\nF 3\nV 1 0 0 0\nV 2 4 0 0\nV 3 4 3 0\nV 4 0 3 0\nV 5 0 0 2\nV 6 4 0 2\nV 7 4 3 2\nV 8 0 3 2\n\
                     V 9 .5 .5 0\nV 10 1 .5 0\nV 11 1 1 0\nV 12 .5 1 0\nV 13 2 .5 0\nV 14 3 .5 0\nV 15 3 1 0\nV 16 2 1 0\n\
