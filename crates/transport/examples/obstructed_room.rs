@@ -50,11 +50,12 @@ fn room(patches: usize) -> Enclosure {
 
 fn main() {
     let sizes: Vec<f64> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
-    let accuracy: f64 = std::env::var("ACCURACY").ok().and_then(|a| a.parse().ok()).unwrap_or(1e-5);
+    let asked = |name: &str, usual: f64| std::env::var(name).ok().and_then(|a| a.parse().ok()).unwrap_or(usual);
+    let (accuracy, clear_accuracy) = (asked("ACCURACY", 1e-5), asked("CLEAR", 1e-9));
     for patches in sizes {
         let enclosure = room(patches as usize);
         let start = Instant::now();
-        let options = ViewFactorOptions { accuracy, ..ViewFactorOptions::default() };
+        let options = ViewFactorOptions { accuracy, clear_accuracy, ..ViewFactorOptions::default() };
         let Ok(mut factors) = view_factors(&enclosure, &options, &()) else { return };
         let seconds = start.elapsed().as_secs_f64();
         let closure = factors.closure();

@@ -242,7 +242,7 @@ fn a_small_shadow_is_not_overlooked() {
 fn stated_errors_hold_among_random_sheets() {
     let mut random = Random::new(11);
     let mut ratios: Vec<f64> = Vec::new();
-    for _ in 0..8 {
+    for _ in 0..6 {
         let mut scene = Enclosure::default();
         for k in 0..6 {
             let mut vector = |size: f64| DVec3::from_array(std::array::from_fn(|_| size * random.next_unit()));
@@ -256,7 +256,7 @@ fn stated_errors_hold_among_random_sheets() {
             scene.add("front", sheet.clone());
             scene.add("back", sheet.flipped());
         }
-        let [coarse, fine] = [1e-3, 1e-5].map(|accuracy| solve(&scene, accuracy));
+        let [coarse, fine] = [1e-3, 2e-5].map(|accuracy| solve(&scene, accuracy));
         for i in 0..scene.facets.len() {
             for j in 0..i {
                 let (found, truth) = (coarse.factor(i, j), fine.factor(i, j));
@@ -268,7 +268,7 @@ fn stated_errors_hold_among_random_sheets() {
     }
     ratios.sort_by(f64::total_cmp);
     let [at_98, most] = [ratios[ratios.len() * 98 / 100], ratios[ratios.len() - 1]];
-    assert!(ratios.len() > 100 && at_98 <= 1.0 && most < 10.0, "{} pairs: {at_98}, {most}", ratios.len());
+    assert!(ratios.len() > 80 && at_98 <= 1.0 && most < 10.0, "{} pairs: {at_98}, {most}", ratios.len());
 }
 
 /// What is asked of surfaces holds for them, though they have several facets that take part.

@@ -24,12 +24,15 @@ const DEPTH: i32 = 12;
 
 /// Least error by the difference of the corners, of the whole and where a shadow begins or ends. Where its edge halves a
 /// cell, the mean of the corners is the value at the centre by symmetry, and neither is the mean.
-const KINK: f64 = 0.15;
+const KINK: f64 = 0.1;
 
 /// Least error of the pieces of a cell by what its division changed: kinks settle as the square of the width, so a quarter
 /// of the change is left. After two divisions none is more than the larger of their changes: where the function is
 /// smooth, T and M are far apart long after their mean has settled. One small change may be chance.
 const LEFT: f64 = 0.25;
+
+/// The whole by this much less certain than its pieces: no division has told how its places mislead.
+const UNDIVIDED: f64 = 2.0;
 
 /// Error of what places did not see hidden, by what might be at most.
 const DOUBT: f64 = 0.25;
@@ -89,8 +92,11 @@ pub trait Shaded {
     /// What is visible and hidden from a place, past the panels listed.
     fn sight(&mut self, x: DVec3, list: &[u16]) -> Sight;
 
-    /// Judges a cell as a whole, of a larger one past the panels listed.
+    /// Judges a cell as a whole, of a larger one past the panels listed, at first sight.
     fn before(&mut self, cell: &[DVec3], list: &[u16]) -> Before;
+
+    /// Whether nothing is hidden from any of a cell, which it is not from its corners.
+    fn is_clear(&mut self, cell: &[DVec3], list: &[u16]) -> bool;
 
     /// Whether all is hidden from all of a cell, which it is from its corners.
     fn is_hidden(&mut self, cell: &[DVec3], list: &[u16]) -> bool;
@@ -162,7 +168,9 @@ impl<S: Shaded> Domain<'_, S> {
     /// A cell of one past the panels listed.
     fn cell(&mut self, frame: usize, at: [i32; 2], size: i32, list: &[u16]) -> Cell {
         let places = self.corners(frame, at, size);
-        let before = self.shaded.before(&places, list);
+        // The whole is judged before.
+        let is_whole = self.frames.len() == 1 && size == 1 << DEPTH;
+        let before = if is_whole { Before::Some(list.into()) } else { self.shaded.before(&places, list) };
         if self.is_known && !matches!(before, Before::Some(_)) {
             return self.settled(&Cell { frame, at, size, before, ..Cell::default() });
         }
@@ -215,6 +223,9 @@ impl<S: Shaded> Domain<'_, S> {
         for k in 0..2 {
             let f = |c: &Sight| c.factors[k] - shares[k] * both(c);
             cell.errors[k] = (area * (f(&centre) - mean(&f).0).abs() / 3.0).max(cell.least[k]);
+            if size.abs() == 1 << DEPTH {
+                cell.errors[k] *= UNDIVIDED;
+            }
         }
         let sees = |k: usize| corners.iter().chain([&centre]).map(|c| c.factors[k]).fold(0.0, f64::max);
         let (seen, hidden) = (sees(0), sees(1));
@@ -227,6 +238,9 @@ impl<S: Shaded> Domain<'_, S> {
                 if is_dark && self.shaded.is_hidden(&places, list) {
                     cell.before = Before::All;
                     cell.clear(0);
+                } else if hidden == 0.0 && self.shaded.is_clear(&places, list) {
+                    cell.before = Before::Nothing;
+                    cell.clear(1);
                 } else {
                     let level = f64::from(size.abs()) / f64::from(1 << DEPTH);
                     let gap = GAP * all * level.powi(4) * (1.0 - MORE * seen / (seen + hidden)).max(0.0);
@@ -346,28 +360,33 @@ pub fn integrate(shape: &Facet, (whole, tolerance): (f64, f64), shaded: &mut imp
 mod tests {
     use super::*;
 
-    /// A function of places alone, of which nothing is proven.
+    /// A function of places alone that is visible, of two that reach each, and of which nothing is proven.
     struct Plain<F>(F);
 
     impl<F: Fn(DVec3) -> f64> Shaded for Plain<F> {
         fn sight(&mut self, x: DVec3, _: &[u16]) -> Sight {
-            Sight { factors: [(self.0)(x); 2], hiding: u64::MAX }
+            let seen = (self.0)(x);
+            Sight { factors: [seen, 2.0 - seen], hiding: u64::MAX }
         }
 
         fn before(&mut self, _: &[DVec3], list: &[u16]) -> Before {
             Before::Some(list.into())
         }
 
+        fn is_clear(&mut self, _: &[DVec3], _: &[u16]) -> bool {
+            false
+        }
+
         fn is_hidden(&mut self, _: &[DVec3], _: &[u16]) -> bool {
-            true
+            false
         }
 
         fn possible(&mut self, _: &[DVec3], _: &[u16]) -> f64 {
             0.0
         }
 
-        fn whole(&mut self, _: &[DVec3]) -> f64 {
-            0.0
+        fn whole(&mut self, cell: &[DVec3]) -> f64 {
+            Facet::new(cell.to_vec()).map_or(0.0, |cell| 2.0 * cell.area())
         }
     }
 
@@ -390,7 +409,7 @@ mod tests {
                 for (shape, exact) in [(&square, over_square(c)), (&triangle, over_triangle(c))] {
                     let found = integrate(
                         shape,
-                        (2.0 * exact, tolerance),
+                        (2.0 * shape.area(), tolerance),
                         &mut Plain(|x: DVec3| (x.x + x.y - c).max(0.0)),
                         &[],
                     );

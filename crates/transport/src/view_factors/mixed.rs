@@ -94,13 +94,18 @@ impl Shaded for View<'_> {
         let mut left = List::new();
         let mut shaft = self.shaft(cell);
         for &k in list {
-            match shaft.stands(self.panels[k as usize], Look::Close) {
+            match shaft.stands(self.panels[k as usize], Look::Rough) {
                 Stands::Aside => {}
                 Stands::Between => left.push(k),
                 Stands::Across => return Before::All,
             }
         }
         if left.is_empty() { Before::Nothing } else { Before::Some(left) }
+    }
+
+    fn is_clear(&mut self, cell: &[DVec3], list: &[u16]) -> bool {
+        let mut shaft = self.shaft(cell);
+        list.iter().all(|k| shaft.stands(self.panels[*k as usize], Look::Close) == Stands::Aside)
     }
 
     fn is_hidden(&mut self, cell: &[DVec3], list: &[u16]) -> bool {

@@ -6,6 +6,9 @@ use radiosity_scene::Facet;
 /// Orders of the rules that are kept: points 1 to 4 along an edge.
 pub const ORDERS: usize = 4;
 
+/// Corners of a part at most, so that shafts need no memory of their own; what has more is taken as triangles.
+pub const CORNERS: usize = 12;
+
 /// A convex polygon of a facet.
 #[derive(Clone, Debug)]
 pub struct Part {
@@ -23,7 +26,7 @@ impl Part {
     /// The convex parts of facet `index`.
     pub fn of(index: u32, facet: &Facet) -> Vec<Part> {
         let part = |shape: Facet| Part { facet: index, radius: shape.radius(), rules: rules(&shape), shape };
-        if facet.is_convex() {
+        if facet.is_convex() && facet.corners().len() <= CORNERS {
             return vec![part(facet.clone())];
         }
         facet.triangles().into_iter().filter_map(|t| Facet::new(t.to_vec()).ok()).map(part).collect()

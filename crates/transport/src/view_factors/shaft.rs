@@ -5,6 +5,7 @@
 //! blocked; if it lies within the panel and the sets lie on either side, everything is. Both are proofs.
 
 use super::panel::Panel;
+use super::part::CORNERS;
 use super::visible::{Loop, keep_above};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -29,11 +30,26 @@ pub enum Look {
     Close,
 }
 
-/// Corners of a polygon, mostly.
-type Few<T> = SmallVec<[T; 8]>;
+/// Corners of an end at most: those of a box, or of a part with a corner cut off.
+const MOST: usize = if CORNERS + 1 > 8 { CORNERS + 1 } else { 8 };
 
-/// A plane by its unit normal and n · x of its points.
-type Plane = (DVec3, f64);
+/// Heights of the corners of an end above a plane.
+struct Over {
+    heights: [f64; MOST],
+    count: usize,
+}
+
+impl std::ops::Deref for Over {
+    type Target = [f64];
+
+    #[inline]
+    fn deref(&self) -> &[f64] {
+        &self.heights[..self.count.min(MOST)]
+    }
+}
+
+/// A plane: a normal n, n · x of its points, and n · x by which points count as lying on it.
+type Plane = (DVec3, f64, f64);
 
 /// What lies between two convex sets.
 #[derive(Clone, Debug)]
@@ -51,25 +67,24 @@ pub struct Shaft<'a> {
 impl<'a> Shaft<'a> {
     /// The shaft between two sets; the normals matter for polygons only.
     pub fn new(ends: [&'a [DVec3]; 2], normals: [DVec3; 2], touch: f64) -> Shaft<'a> {
+        debug_assert!(ends.iter().all(|end| end.len() <= MOST));
         Shaft { ends, normals, touch, sides: None }
     }
 
     /// What `panel` does to the segments from one end to the other.
     pub fn stands(&mut self, panel: &Panel, look: Look) -> Stands {
         let touch = self.touch;
-        let [from, to] = self.ends;
-        let [a, b] = self.ends.map(|end| end.iter().map(|p| panel.height(*p)).collect::<Few<f64>>());
-        let side = |h: &[f64]| (h.iter().all(|h| *h >= -touch), h.iter().all(|h| *h <= touch));
+        let (a, b) = (self.over(0, panel.normal, panel.offset), self.over(1, panel.normal, panel.offset));
+        let side = |h: &Over| (h.iter().all(|h| *h >= -touch), h.iter().all(|h| *h <= touch));
         let ((a_above, a_below), (b_above, b_below)) = (side(&a), side(&b));
         if (a_above && b_above) || (a_below && b_below) {
             return Stands::Aside;
         }
         let is_parted = (a_above && b_below) || (a_below && b_above);
         let mut all_within = true;
-        for (inwards, offset) in &panel.rims {
-            let inside = |points: &[DVec3]| points.iter().map(|p| inwards.dot(*p) - offset).collect::<Few<f64>>();
+        for &(inwards, offset) in &panel.rims {
+            let (e, f) = (self.over(0, inwards, offset), self.over(1, inwards, offset));
             let mut crossings = Crossings { touch, outside: true, within: true };
-            let (e, f) = (inside(from), inside(to));
             crossings.between([&a, &b], [&e, &f]);
             if !is_parted {
                 crossings.between([&a, &a], [&e, &e]);
@@ -85,15 +100,28 @@ impl<'a> Shaft<'a> {
         if all_within && is_parted {
             return Stands::Across;
         }
-        let is_beside = |(outwards, offset): &Plane| panel.corners.iter().all(|c| outwards.dot(*c) - offset >= -touch);
+        let is_beside = |(outwards, offset, reach): &Plane| {
+            let least = offset - reach;
+            panel.corners.iter().all(|c| outwards.dot(*c) >= least)
+        };
         let is_aside = look == Look::Close && self.sides().iter().any(is_beside);
         if is_aside { Stands::Aside } else { Stands::Between }
+    }
+
+    /// Heights of the corners of an end above a plane.
+    #[inline]
+    fn over(&self, end: usize, normal: DVec3, offset: f64) -> Over {
+        let mut over = Over { heights: [0.0; MOST], count: self.ends[end].len() };
+        for (height, corner) in over.heights.iter_mut().zip(self.ends[end]) {
+            *height = normal.dot(*corner) - offset;
+        }
+        over
     }
 
     /// What of a panel lies in the shaft between two polygons; empty if nothing.
     pub fn part_of(&mut self, panel: &Panel) -> Loop {
         let mut part: Loop = panel.corners.iter().copied().collect();
-        for (outwards, offset) in self.sides() {
+        for (outwards, offset, _) in self.sides() {
             if !keep_above(&mut part, -*outwards, -offset) {
                 return Loop::new();
             }
@@ -116,6 +144,7 @@ struct Crossings {
 
 impl Crossings {
     /// Segments between two sets of corners, by their heights above the plane and their distances within the edge.
+    #[inline]
     fn between(&mut self, heights: [&[f64]; 2], inside: [&[f64]; 2]) {
         for (a, e) in heights[0].iter().zip(inside[0]) {
             for (b, f) in heights[1].iter().zip(inside[1]) {
@@ -144,13 +173,13 @@ impl Crossings {
 fn sides(ends: [&[DVec3]; 2], normals: [DVec3; 2], touch: f64) -> SmallVec<[Plane; 12]> {
     let mut sides = SmallVec::new();
     for (own, other, normal) in [(ends[0], ends[1], normals[0]), (ends[1], ends[0], normals[1])] {
-        let heights = other.iter().map(|q| normal.dot(*q - own[0]));
-        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let heights: SmallVec<[f64; MOST]> = other.iter().map(|q| normal.dot(*q - own[0])).collect();
+        let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
         if low >= -touch {
-            sides.push((-normal, -normal.dot(own[0])));
+            sides.push((-normal, -normal.dot(own[0]), touch));
         }
         if high <= touch {
-            sides.push((normal, normal.dot(own[0])));
+            sides.push((normal, normal.dot(own[0]), touch));
         }
         // Seen along an edge, the polygon and what lies above it span a wedge; so do the polygon and what lies below.
         for (turn, is_there) in [(1.0, high > touch), (-1.0, low < -touch)] {
@@ -159,16 +188,16 @@ fn sides(ends: [&[DVec3]; 2], normals: [DVec3; 2], touch: f64) -> SmallVec<[Plan
             }
             for (i, &p) in own.iter().enumerate() {
                 let along = turn * (own[(i + 1) % own.len()] - p);
-                let mut side = DVec3::ZERO;
-                for &q in other {
+                let (mut side, mut of) = (DVec3::ZERO, 0.0);
+                for (&q, height) in other.iter().zip(&heights) {
                     if side == DVec3::ZERO || side.dot(q - p) > 0.0 {
-                        side = along.cross(q - p);
+                        (side, of) = (along.cross(q - p), turn * height);
                     }
                 }
-                let side = side.normalize_or_zero();
-                let holds = |x: &DVec3| side.dot(*x - p) <= touch;
-                if side != DVec3::ZERO && other.iter().all(holds) && own.iter().all(holds) {
-                    sides.push((side, side.dot(p)));
+                // What lies on the polygon's own side of the edge stays behind a plane that rises from it.
+                let reach = touch * side.length();
+                if of >= 0.0 && reach > 0.0 && other.iter().all(|x| side.dot(*x - p) <= reach) {
+                    sides.push((side, side.dot(p), reach));
                 }
             }
         }

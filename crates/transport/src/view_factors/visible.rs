@@ -149,8 +149,9 @@ enum Within {
 }
 
 fn within(polygon: &[DVec3], shadow: &Shadow) -> Within {
-    let mut all = true;
-    for (normal, offset) in shadow {
+    // The planes that cut, as bits.
+    let mut cuts = 0u64;
+    for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
         for p in polygon {
             let h = normal.dot(*p) - offset;
@@ -160,14 +161,16 @@ fn within(polygon: &[DVec3], shadow: &Shadow) -> Within {
         if high <= reach {
             return Within::None;
         }
-        all &= low >= -reach;
+        if low < -reach {
+            cuts |= 1 << k.min(63);
+        }
     }
-    if all {
+    if cuts == 0 {
         return Within::All;
     }
-    let mut part: Loop = polygon.iter().copied().collect();
-    for &(normal, offset) in shadow {
-        if !keep_above(&mut part, normal, offset) {
+    let mut part: Loop = polygon.into();
+    for (k, &(normal, offset)) in shadow.iter().enumerate() {
+        if cuts >> k.min(63) & 1 == 1 && !keep_above(&mut part, normal, offset) {
             return Within::None;
         }
     }
@@ -176,12 +179,13 @@ fn within(polygon: &[DVec3], shadow: &Shadow) -> Within {
 
 /// Cuts off what lies below a plane; whether anything is left.
 pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
-    let mut heights: SmallVec<[f64; 10]> = SmallVec::new();
+    let n = polygon.len();
+    let mut heights: SmallVec<[f64; 16]> = SmallVec::from_elem(0.0, n);
     let (mut low, mut high) = (0.0f64, 0.0f64);
-    for p in &*polygon {
+    for (height, p) in heights.iter_mut().zip(&*polygon) {
         let h = normal.dot(*p) - offset;
         (low, high) = (low.min(h), high.max(h));
-        heights.push(h);
+        *height = h;
     }
     let reach = ROUNDING * high.max(-low);
     if high <= reach {
@@ -190,16 +194,16 @@ pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
     if low >= -reach {
         return true;
     }
-    let n = polygon.len();
     let mut kept = Loop::new();
-    for (i, (&p, &h)) in polygon.iter().zip(&heights).enumerate() {
-        let k = if i + 1 == n { 0 } else { i + 1 };
-        if h >= -reach {
-            kept.push(p);
+    let (mut p, mut h) = (polygon[n - 1], heights[n - 1]);
+    for (&next, &height) in polygon.iter().zip(&heights) {
+        if (h > reach && height < -reach) || (h < -reach && height > reach) {
+            kept.push(p + h / (h - height) * (next - p));
         }
-        if (h > reach && heights[k] < -reach) || (h < -reach && heights[k] > reach) {
-            kept.push(p + h / (h - heights[k]) * (polygon[k] - p));
+        if height >= -reach {
+            kept.push(next);
         }
+        (p, h) = (next, height);
     }
     *polygon = kept;
     polygon.len() >= 3
