@@ -6,6 +6,7 @@
 //! own coefficients, in the space's inner product.
 
 use crate::gauge::{Gauge, begin, is_done, remainder};
+use crate::krylov::{image, ratio};
 use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
 
 /// |⟨r̂, r⟩| below this share of ‖r̂‖‖r‖ is a breakdown: √ε leaves half the digits to the coefficients that follow.
@@ -27,20 +28,9 @@ pub fn bicgstab<T: Transport>(
     let (bands, n) = (response.bands(), b.len());
     let gauge = Gauge::new(transport, response, e);
     let dot = |x: &[f64], y: &[f64]| transport.space().inner(x, y, bands);
-    let mut h = vec![0.0; n];
-    // A x = x − R F x.
-    let mut image = |x: &[f64], ax: &mut [f64]| {
-        transport.apply(x, &mut h, bands);
-        response.respond(&h, ax);
-        for (ax, x) in ax.iter_mut().zip(x) {
-            *ax = x - *ax;
-        }
-    };
-
-    let mut r = vec![0.0; n];
-    let mut start = vec![0.0; n];
-    let begun = begin(transport, b, &mut start, bands);
-    remainder(response, (e, b, &start), &mut r);
+    let (mut h, mut r) = (vec![0.0; n], vec![0.0; n]);
+    let begun = begin(transport, b, &mut h, bands);
+    remainder(response, (e, b, &h), &mut r);
     let mut shadow = r.clone();
     let (mut p, mut v, mut t) = (r.clone(), vec![0.0; n], vec![0.0; n]);
     let mut rho = dot(&shadow, &r);
@@ -52,14 +42,14 @@ pub fn bicgstab<T: Transport>(
         }
 
         // Along p, as far as the shadow says; s is left in r.
-        image(&p, &mut v);
+        image(transport, response, &p, &mut h, &mut v);
         let along = dot(&shadow, &v);
         let alpha: Vec<f64> = (0..bands).map(|band| ratio(rho[band], along[band])).collect();
         for k in 0..n {
             r[k] -= alpha[k % bands] * v[k];
         }
         // Along s, to the smallest residual.
-        image(&r, &mut t);
+        image(transport, response, &r, &mut h, &mut t);
         let (ts, tt) = (dot(&t, &r), dot(&t, &t));
         let omega: Vec<f64> = (0..bands).map(|band| ratio(ts[band], tt[band])).collect();
         for k in 0..n {
@@ -85,9 +75,4 @@ pub fn bicgstab<T: Transport>(
         }
         rho = (0..bands).map(|band| if anew[band] { size[band] } else { next[band] }).collect();
     }
-}
-
-/// A band that is solved has nothing left to divide.
-fn ratio(num: f64, den: f64) -> f64 {
-    if den == 0.0 { 0.0 } else { num / den }
 }

@@ -5,6 +5,7 @@
 //! all bands run side by side with their own step lengths.
 
 use crate::gauge::{Gauge, is_done, remainder};
+use crate::krylov::image;
 use crate::{Go, Info, Params, Response, SolveError, Transport};
 
 /// Solves B = E + R F B in place; `b` holds the start and the result. `step` sees each iterate.
@@ -53,14 +54,9 @@ pub fn conjugate_gradient<T: Transport>(
             return Ok(info);
         }
 
-        // A p = p − R F p.
-        transport.apply(&p, &mut h, bands);
+        image(transport, response, &p, &mut h, &mut ap);
         info.steps += 1;
         info.work += 1.0;
-        response.respond(&h, &mut ap);
-        for (ap, p) in ap.iter_mut().zip(&p) {
-            *ap = p - *ap;
-        }
         let pap = dot(&p, &ap);
         let alpha: Vec<f64> = (0..bands).map(|band| ratio(rr[band], pap[band])).collect();
         for i in 0..n {

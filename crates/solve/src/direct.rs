@@ -3,8 +3,9 @@
 //!
 //! LU with partial pivoting solves (I − R F) B = E as it stands. Cholesky takes the symmetric form (catalogue 8),
 //! (A_i/ρ_i) B_i − Σ_j A_i F_ij B_j = A_i E_i/ρ_i, at half the cost; black unknowns, known beforehand, go to the
-//! right-hand side. Both need N³ time for each band, 24 N² and 16 N² bytes at most ([`crate::Solver::matrix_bytes`]), N/3 and N/6 applications of F, and serve as the
-//! oracle of all others. A start is of no use to them. The factors are faer's.
+//! right-hand side. Both need N³ time for each band, N/3 and N/6 applications of F, and 24 N² and 16 N² bytes at most
+//! ([`crate::Solver::matrix_bytes`]); they serve as the oracle of all others. A start is of no use to them. The factors
+//! are faer's.
 
 use crate::gauge::{Gauge, is_done};
 use crate::{Go, Info, Params, Response, Rows, SolveError, Space};

@@ -8,6 +8,7 @@
 //! application of F a step.
 
 use crate::gauge::{Gauge, begin, is_done, remainder};
+use crate::krylov::{image, ratio};
 use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
 
 /// Solves B = E + R F B in place, with [`Params::restart`] directions; `b` holds the start and the result.
@@ -41,33 +42,24 @@ pub fn gmres<T: Transport>(
         }
 
         // The residual is the new direction, once its image has lost what the others' have.
-        let (mut p, mut image) = (r.clone(), vec![0.0; n]);
-        transport.apply(&p, &mut h, bands);
-        response.respond(&h, &mut image);
-        for (image, p) in image.iter_mut().zip(&p) {
-            *image = p - *image;
-        }
-        for (other, others_image, square) in &kept {
-            let share = dot(&image, others_image);
+        let (mut p, mut own) = (r.clone(), vec![0.0; n]);
+        image(transport, response, &p, &mut h, &mut own);
+        for (other, of_other, square) in &kept {
+            let share = dot(&own, of_other);
             for k in 0..n {
                 let c = ratio(share[k % bands], square[k % bands]);
                 p[k] -= c * other[k];
-                image[k] -= c * others_image[k];
+                own[k] -= c * of_other[k];
             }
         }
-        let (square, along) = (dot(&image, &image), dot(&r, &image));
+        let (square, along) = (dot(&own, &own), dot(&r, &own));
         for k in 0..n {
             let alpha = ratio(along[k % bands], square[k % bands]);
             b[k] += alpha * p[k];
-            r[k] -= alpha * image[k];
+            r[k] -= alpha * own[k];
         }
-        kept.push((p, image, square));
+        kept.push((p, own, square));
         info.steps += 1;
         info.work += 1.0;
     }
-}
-
-/// A band that is solved has nothing left to divide.
-fn ratio(num: f64, den: f64) -> f64 {
-    if den == 0.0 { 0.0 } else { num / den }
 }

@@ -17,6 +17,7 @@ mod direct;
 mod gauge;
 mod gmres;
 mod jacobi;
+mod krylov;
 mod neumann;
 mod overshooting;
 mod progressive;

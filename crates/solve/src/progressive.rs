@@ -5,7 +5,7 @@
 //! - sorted (catalogue 40): i has the greatest unshot energy A_i ΔB_i, summed over the bands;
 //! - cyclic: i runs through all that have anything to shoot;
 //! - sorted, shown with an ambient term (catalogue 41): B_i + ρ_i ΔB̄/(1 − ρ̄) stands in for what is still to come.
-//!   It is   for show only and never shot.
+//!   It is for show only and never shot.
 //!
 //! The residual told is that of what has been shot, B − ΔB: exactly ΔB. The field shown includes ΔB, which has
 //! arrived but not left, so its own residual R F ΔB is smaller still, and the bound holds for it too. It takes as
