@@ -12,6 +12,17 @@ use std::sync::OnceLock;
 /// gathering.
 pub(crate) const RECIPROCAL: f64 = 1e-12;
 
+/// Refuses areas that are negative or no finite numbers, and factors that are none: bounds and norms rest on them.
+pub(crate) fn check_numbers(area: &[f64], mut factors: impl Iterator<Item = f64>) -> Result<(), SolveError> {
+    if !area.iter().all(|area| area.is_finite() && *area >= 0.0) {
+        return Err(SolveError::NotApplicable("areas must be finite numbers from 0"));
+    }
+    if !factors.all(f64::is_finite) {
+        return Err(SolveError::NotApplicable("form factors must be finite numbers"));
+    }
+    Ok(())
+}
+
 /// A full matrix of form factors.
 ///
 /// ```
@@ -36,11 +47,12 @@ impl DenseTransport {
     /// From areas and the N × N factors, row-major.
     ///
     /// # Errors
-    /// If the number of factors is not the square of the number of areas.
+    /// If the number of factors is not the square of the number of areas, or an area or a factor is no finite number.
     pub fn new(area: Vec<f64>, rows: Vec<f64>) -> Result<DenseTransport, SolveError> {
         if rows.len() != area.len() * area.len() {
             return Err(SolveError::NotApplicable("a form-factor matrix needs as many rows and columns as areas"));
         }
+        check_numbers(&area, rows.iter().copied())?;
         let row_sum = rows
             .chunks_exact(area.len().max(1))
             .map(|row| row.iter().map(|f| f.abs()).sum::<f64>())

@@ -209,7 +209,7 @@ impl FromStr for Solver {
     }
 }
 
-/// Refuses fields of the wrong length and reflectances that no surface has (catalogue 35). One is allowed, for
+/// Refuses fields of the wrong length or of what is no number, and reflectances that no surface has (catalogue 35). One is allowed, for
 /// surfaces that give back all they receive in an enclosure that is otherwise open or grey; the bound is infinite
 /// then.
 fn check<T: Transport>(
@@ -219,8 +219,14 @@ fn check<T: Transport>(
     b: &[f64],
 ) -> Result<(), SolveError> {
     let bands = response.bands();
+    if bands == 0 {
+        return Err(SolveError::NotApplicable("a response needs one band at least"));
+    }
     if e.len() != transport.space().dim() * bands || b.len() != e.len() {
         return Err(SolveError::NotApplicable("emission and field need one number for each unknown and band"));
+    }
+    if !e.iter().chain(b).all(|x| x.is_finite()) {
+        return Err(SolveError::NotApplicable("emission and the start must be finite numbers"));
     }
     if let Some(rho) = response.diagonal() {
         if rho.len() != e.len() {

@@ -4,7 +4,7 @@
 //! answer by some 1e-7; it does so for F_ij and F_ji apart, so that columns are then kept beside the rows as soon as
 //! one is asked for.
 
-use crate::dense::RECIPROCAL;
+use crate::dense::{RECIPROCAL, check_numbers};
 use crate::{AreaSpace, Rows, Shoot, SolveError, Space, Transport};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -67,7 +67,8 @@ impl<V: Copy + Into<f64> + Send + Sync> SparseTransport<V> {
     /// From areas and compressed rows: row i has the entries `starts[i]..starts[i + 1]` of `columns` and `values`.
     ///
     /// # Errors
-    /// If the lengths do not agree, a column does not exist, or the columns of a row do not rise.
+    /// If the lengths do not agree, a column does not exist, the columns of a row do not rise, or an area or a factor is
+    /// no finite number.
     pub fn new(
         area: Vec<f64>,
         starts: Vec<usize>,
@@ -87,6 +88,7 @@ impl<V: Copy + Into<f64> + Send + Sync> SparseTransport<V> {
         if !starts.windows(2).all(rising) || columns.iter().any(|j| *j as usize >= n) {
             return Err(SolveError::NotApplicable("the columns of a compressed row must rise and exist"));
         }
+        check_numbers(&area, values.iter().map(|value| (*value).into()))?;
         let rows = Compressed { starts, columns, values };
         let row_sum = (0..n).map(|i| rows.row(i).map(|(_, f)| f.abs()).sum::<f64>()).fold(0f64, f64::max);
         Ok(SparseTransport { space: AreaSpace { area }, rows, row_sum, columns: OnceLock::new() })

@@ -7,6 +7,7 @@
 //! of what shoots: a patch shines evenly. F is not reciprocal between elements, so of the Krylov methods take
 //! bicgstab or gmres for it.
 
+use crate::dense::check_numbers;
 use crate::{AreaSpace, DenseTransport, SolveError, Transport};
 use rayon::prelude::*;
 
@@ -35,12 +36,13 @@ impl Substructure {
     /// From the area and the patch of each element, and the M × N factors from elements to patches, row-major.
     ///
     /// # Errors
-    /// If the lengths do not agree, or a patch has no element.
+    /// If the lengths do not agree, a patch has no element, or an area or a factor is no finite number.
     pub fn new(area: Vec<f64>, patch: Vec<u32>, factors: Vec<f64>) -> Result<Substructure, SolveError> {
         let patches = patch.iter().max().map_or(0, |last| *last as usize + 1);
         if patch.len() != area.len() || factors.len() != area.len() * patches {
             return Err(SolveError::NotApplicable("each element needs an area, a patch, and a factor to every patch"));
         }
+        check_numbers(&area, factors.iter().copied())?;
         let mut patch_area = vec![0.0; patches];
         for (area, patch) in area.iter().zip(&patch) {
             patch_area[*patch as usize] += area;

@@ -377,6 +377,35 @@ fn names_go_both_ways() {
     assert!(names.iter().all(|name| unknown.contains(name)), "{unknown}");
 }
 
+/// What is no finite number would make every bound worthless: it is refused with its kind.
+#[test]
+fn numbers_that_are_none_are_refused() {
+    let says = |result: Result<(), SolveError>, word: &str| {
+        let error = result.unwrap_err().to_string();
+        assert!(error.contains(word) && error.contains("finite"), "{error}");
+    };
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        says(DenseTransport::new(vec![1.0, bad], vec![0.0; 4]).map(drop), "areas");
+        says(DenseTransport::new(vec![1.0; 2], vec![0.0, bad, 0.0, 0.0]).map(drop), "factors");
+        says(SparseTransport::new(vec![bad], vec![0, 0], vec![], Vec::<f64>::new()).map(drop), "areas");
+        says(SparseTransport::new(vec![1.0], vec![0, 1], vec![0], vec![bad as f32]).map(drop), "factors");
+        says(Substructure::new(vec![bad], vec![0], vec![0.5]).map(drop), "areas");
+        says(Substructure::new(vec![1.0], vec![0], vec![bad]).map(drop), "factors");
+        let system = room(1);
+        for solver in Solver::ALL {
+            let (mut e, mut b) = (system.e.clone(), vec![0.0; system.e.len()]);
+            e[1] = bad;
+            let refused = solve(*solver, &system.transport, &system.response, &e, &mut b, &tight(), |_, _| Go::On);
+            says(refused.map(drop), "emission");
+            b[1] = bad;
+            let refused =
+                solve(*solver, &system.transport, &system.response, &system.e, &mut b, &tight(), |_, _| Go::On);
+            says(refused.map(drop), "start");
+        }
+    }
+    says(DenseTransport::new(vec![-1.0], vec![0.0]).map(drop), "areas");
+}
+
 /// Wrong lengths are refused before they are read, and each solver can be stopped and run out of work.
 #[test]
 fn every_solver_stops_when_told() {
