@@ -12,6 +12,13 @@ const PLANAR: f64 = 1e-5;
 /// Area below which a polygon is a line, relative to the square of its extent.
 const LINE: f64 = 1e-12;
 
+/// Largest coordinate, metres. Areas and their powers stay numbers in double precision, and errors in single; with 1e80 all
+/// form factors were zero, and said to be exact.
+const FARTHEST: f64 = 1e15;
+
+/// Least extent, metres, for the same reason.
+const LEAST: f64 = 1e-15;
+
 /// Why corners make no facet.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FacetError {
@@ -21,6 +28,9 @@ pub enum FacetError {
     /// A coordinate is NaN or infinite.
     #[error("a coordinate is not a finite number")]
     NotFinite,
+    /// A coordinate is beyond all lengths.
+    #[error("a coordinate is {0:e} m, and none may be beyond 1e15 m")]
+    TooFar(f64),
     /// The corners lie on a line or in a point.
     #[error("the area is zero: the corners lie on a line")]
     NoArea,
@@ -43,7 +53,8 @@ impl Facet {
     /// The facet with these corners (metres).
     ///
     /// # Errors
-    /// [`FacetError`] where they are too few, not finite, on a line or not in a plane.
+    /// [`FacetError`] where they are too few, not finite, beyond 1e15 m, on a line or in a point (within 1e-15 m), or not in
+    /// a plane.
     pub fn new(corners: Vec<DVec3>) -> Result<Facet, FacetError> {
         if corners.len() < 3 {
             return Err(FacetError::Corners(corners.len()));
@@ -51,13 +62,17 @@ impl Facet {
         if corners.iter().any(|c| !c.is_finite()) {
             return Err(FacetError::NotFinite);
         }
+        let farthest = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
+        if farthest > FARTHEST {
+            return Err(FacetError::TooFar(farthest));
+        }
         let origin = corners[0];
         let extent = corners.iter().map(|c| c.distance(origin)).fold(0.0, f64::max);
         // Newell's normal, from the fan about the first corner.
         let fan = || corners[1..].windows(2).map(|pair| [pair[0] - origin, pair[1] - origin]);
         let twice: DVec3 = fan().map(|[a, b]| a.cross(b)).sum();
         let area = 0.5 * twice.length();
-        if area.is_nan() || area <= LINE * extent * extent {
+        if extent < LEAST || area <= LINE * extent * extent {
             return Err(FacetError::NoArea);
         }
         let normal = twice / (2.0 * area);
@@ -106,6 +121,12 @@ impl Facet {
         (point - self.corners[0]).dot(self.normal)
     }
 
+    /// Whether each has a corner before the other's plane: where not, no light goes from one front to the other.
+    pub fn faces(&self, other: &Facet) -> bool {
+        let is_before = |a: &Facet, b: &Facet| b.corners.iter().any(|c| a.height(*c) > 0.0);
+        is_before(self, other) && is_before(other, self)
+    }
+
     /// Radius of the smallest ball about the centroid that holds the facet.
     pub fn radius(&self) -> f64 {
         self.corners.iter().map(|c| c.distance(self.centroid)).fold(0.0, f64::max)
@@ -124,7 +145,8 @@ impl Facet {
         Facet { corners, normal: -self.normal, ..self.clone() }
     }
 
-    /// Triangles that cover the facet, of its orientation: a fan where it is convex, else ears cut off one by one.
+    /// Triangles that cover the facet, of its orientation, one at least: a fan where it is convex, else ears cut off one by
+    /// one.
     pub fn triangles(&self) -> Vec<[DVec3; 3]> {
         let mut left = self.corners.clone();
         if self.convex {
@@ -149,6 +171,10 @@ impl Facet {
         }
         triangles.push([left[0], left[1], left[2]]);
         triangles.retain(|[a, b, c]| (*b - *a).cross(*c - *a).dot(self.normal) > 0.0);
+        if triangles.is_empty() {
+            // Rounding has left none: the area is next to nothing, and any three corners do.
+            triangles.push([self.corners[0], self.corners[1], self.corners[2]]);
+        }
         triangles
     }
 }
@@ -242,6 +268,9 @@ mod tests {
         assert_eq!(is(at(&[[0., 0.], [1., 0.]])), FacetError::Corners(2));
         assert_eq!(is(at(&[[0., 0.], [1., 0.], [2., 0.]])), FacetError::NoArea);
         assert_eq!(is(at(&[[0., 0.], [f64::NAN, 0.], [2., 0.]])), FacetError::NotFinite);
+        let square = |size: f64| at(&[[0., 0.], [size, 0.], [size, size], [0., size]]);
+        assert_eq!(is(square(1e80)), FacetError::TooFar(1e80));
+        assert_eq!(is(square(1e-80)), FacetError::NoArea);
         let bent = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.1), DVec3::Y];
         assert!(matches!(is(bent), FacetError::NotPlanar(_)));
     }

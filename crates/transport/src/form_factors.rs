@@ -295,7 +295,7 @@ impl From<ViewFactors> for FormFactors {
 }
 
 /// Single precision, never below: a bound stays one.
-fn round_up(x: f64) -> f32 {
+pub(crate) fn round_up(x: f64) -> f32 {
     let near = x as f32;
     if f64::from(near) < x { near.next_up() } else { near }
 }
@@ -306,12 +306,11 @@ fn by_pairs(method: PairMethod, enclosure: &Enclosure, progress: &impl Progress)
     let blockers = Blockers::new(facets.iter().chain(&enclosure.obstructions));
     let pair = method.build();
     let done = AtomicUsize::new(0);
-    let faces = |a: &Facet, b: &Facet| b.corners().iter().any(|c| a.height(*c) > 0.0);
     let rows: Vec<Vec<(usize, (f64, f64))>> = (0..facets.len())
         .into_par_iter()
         .map(|i| {
             let own = &facets[i];
-            let row = facets.iter().enumerate().filter(|(j, to)| *j != i && faces(own, to) && faces(to, own));
+            let row = facets.iter().enumerate().filter(|(j, to)| *j != i && own.faces(to));
             let row = row.map(|(j, to)| {
                 let factor = pair.factor(own, to, &blockers as &dyn Occlusion);
                 (j, (factor.value, factor.error))

@@ -5,9 +5,9 @@
 //! wide, so that the centre cannot stand for all of it (proximity); *hidden*, something stands between, in part or
 //! wholly; *small*, j has fewer than 32 cells or rays (aliasing, noise); *rest*.
 
+use super::difference::each_pair;
 use super::problem::{Problem, bright};
 use super::reference::Reference;
-use super::trial::each_pair;
 use glam::DVec3;
 use radiosity_transport::FormFactors;
 use rayon::prelude::*;

@@ -1,9 +1,9 @@
 //! How time and memory grow with the mesh: the same contender on meshes from a quarter of the elements to twice as many,
 //! and the exponents of a line through them, both axes logarithmic (catalogue 44).
 
+use super::attempt::{Attempt, attempt};
 use super::contender::{Contender, Setting};
 use super::problem::Problem;
-use super::trial::{Attempt, attempt};
 use crate::{Error, Monitor};
 use serde::Serialize;
 

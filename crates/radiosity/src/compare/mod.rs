@@ -6,8 +6,10 @@
 //! do not depend on the run, times do, and with them who is let run.
 
 mod allowance;
+mod attempt;
 mod causes;
 mod contender;
+mod difference;
 mod growth;
 mod look;
 mod march;
@@ -28,6 +30,7 @@ pub use trial::{Skipped, Trial};
 pub use truth::Truth;
 
 use crate::{Error, Monitor};
+use attempt::Attempt;
 use look::Look;
 use problem::Problem;
 use radiosity_scene::Elements;
@@ -37,7 +40,6 @@ use radiosity_view::Picture;
 use reference::Reference;
 use serde::Serialize;
 use std::time::Instant;
-use trial::Attempt;
 
 /// What to compare.
 #[derive(Clone, Debug)]
@@ -299,7 +301,7 @@ fn run(
             Some(seconds) => seconds,
             None => {
                 monitor.stage(format!("{contender} {setting}").trim_end());
-                match trial::attempt(contender, setting, problem, allowed, monitor)? {
+                match attempt::attempt(contender, setting, problem, allowed, monitor)? {
                     Attempt::Done(made) => {
                         let trial = trial::judge((contender, setting), *made, problem, reference, from_truth, monitor)?;
                         trials.push((place, trial));

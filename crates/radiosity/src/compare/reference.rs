@@ -2,8 +2,8 @@
 //! gradients to rounding.
 
 use super::contender::{Contender, Setting};
+use super::difference::light_error;
 use super::problem::{Problem, bright};
-use super::trial::light_error;
 use crate::monitor::Watch;
 use crate::{Error, Monitor};
 use radiosity_solve::{Params, Solver, SparseTransport, Transport, solve};

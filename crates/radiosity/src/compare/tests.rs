@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::cornell_box;
+use difference::each_pair;
 use glam::DVec3;
 use problem::Problem;
 use radiosity_scene::{Material, Mesh, Scene};
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors};
-use trial::each_pair;
 
 /// Time that is never over.
 const AMPLE: f64 = 1e6;

@@ -27,13 +27,14 @@ use crate::pair::Factor;
 use crate::pair::exact::exact;
 use crate::{Progress, Stopped};
 use glam::DVec3;
-use radiosity_scene::{Enclosure, Facet};
+use radiosity_scene::Enclosure;
 use radiosity_trace::sampling::{frame, hash, unit};
 
 /// How a row is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// Cells along a whole side of the projection surface. Errors of small facets fall as its inverse.
+    /// Cells along a whole side of the projection surface: an even number from 4 to [`super::MOST_CELLS`], for which the
+    /// nearest is taken. Errors of small facets fall as its inverse.
     pub resolution: usize,
     /// Eye points along each side of the facet. One is the classic centre point.
     pub points: usize,
@@ -114,8 +115,7 @@ impl<'a> Between<'a> {
     /// rim, and all that it would take is as little.
     fn most(&self, j: usize) -> f64 {
         let (own, other) = (&self.view.enclosure.facets[self.from], &self.view.enclosure.facets[j]);
-        let faces = |a: &Facet, b: &Facet| b.corners().iter().any(|c| a.height(*c) > 0.0);
-        if self.from == j || !faces(own, other) || !faces(other, own) {
+        if self.from == j || !own.faces(other) {
             return 0.0;
         }
         let seen = |(eye, share): &(DVec3, f64)| (self.view.potential(*eye, own.normal(), j, ROUGH), *share);

@@ -37,7 +37,7 @@ pub(super) fn eye_points(facet: &Facet, k: usize) -> Vec<(DVec3, f64)> {
         return weigh((0..k * k).map(cell).collect());
     }
     let mut pieces = Vec::new();
-    for [a, b, c] in pieces_of(facet) {
+    for [a, b, c] in facet.triangles() {
         let area = 0.5 * (b - a).cross(c - a).length();
         let n = (k as f64 * (area / facet.area()).sqrt()).ceil().max(1.0) as usize;
         let at = |i: f64, j: f64| (a + (b - a) * (i / n as f64)) + (c - a) * (j / n as f64);
@@ -54,12 +54,6 @@ pub(super) fn eye_points(facet: &Facet, k: usize) -> Vec<(DVec3, f64)> {
         pieces[last..].iter_mut().for_each(|piece| piece.1 /= (n * n) as f64);
     }
     weigh(pieces)
-}
-
-/// The facet's triangles; any three corners where rounding has left none.
-fn pieces_of(facet: &Facet) -> Vec<[DVec3; 3]> {
-    let triangles = facet.triangles();
-    if triangles.is_empty() { vec![std::array::from_fn(|i| facet.corners()[i])] } else { triangles }
 }
 
 /// The centroid, or the centre of the largest triangle of a facet that does not contain its own.
@@ -86,7 +80,7 @@ pub(super) struct Places {
 
 impl Places {
     pub fn new(facet: &Facet) -> Places {
-        let triangles = pieces_of(facet);
+        let triangles = facet.triangles();
         let areas: Vec<f64> = triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).collect();
         let whole: f64 = areas.iter().sum();
         let mut end = 0.0;

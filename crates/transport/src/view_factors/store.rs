@@ -2,6 +2,7 @@
 
 use super::Choices;
 use super::clear::Exchange;
+use crate::form_factors::round_up;
 use crate::pair::Factor;
 use radiosity_scene::Enclosure;
 
@@ -18,12 +19,6 @@ impl Entry {
     pub fn new(a: u32, b: u32, exchange: Exchange) -> Entry {
         Entry { pair: [a.min(b), a.max(b)], value: exchange.value, error: round_up(exchange.error) }
     }
-}
-
-/// Single precision, never below.
-fn round_up(x: f64) -> f32 {
-    let near = x as f32;
-    if f64::from(near) < x { near.next_up() } else { near }
 }
 
 /// View factors between N facets (or surfaces), symmetric by storage: of A_i F_ij = A_j F_ji only i ≤ j is kept, by rows.
@@ -69,7 +64,7 @@ impl ViewFactors {
                 if of.columns.len() > first && of.columns.last() == Some(&column) {
                     let last = of.values.len() - 1;
                     of.values[last] += value;
-                    of.errors[last] += error;
+                    of.errors[last] = round_up(f64::from(of.errors[last]) + f64::from(error));
                 } else {
                     of.columns.push(column);
                     of.values.push(value);
