@@ -5,13 +5,35 @@
 
 use glam::DVec3;
 
+/// Twice the area of a planar polygon, along its normal (Newell's), m².
+pub(crate) fn twice_area(corners: &[DVec3]) -> DVec3 {
+    let Some(first) = corners.first() else { return DVec3::ZERO };
+    corners[1..].windows(2).map(|pair| (pair[0] - *first).cross(pair[1] - *first)).sum()
+}
+
+/// The part of a polygon where `heights`, those of its corners above a plane, are not negative (Sutherland and Hodgman
+/// 1974). A concave one may come back in pieces joined along the plane, where both ways cancel.
+pub(crate) fn above(corners: &[DVec3], heights: &[f64]) -> Vec<DVec3> {
+    let n = corners.len();
+    let mut kept = Vec::with_capacity(n + 2);
+    for i in 0..n {
+        let j = (i + 1) % n;
+        if heights[i] >= 0.0 {
+            kept.push(corners[i]);
+        }
+        if heights[i] * heights[j] < 0.0 {
+            kept.push(corners[i] + heights[i] / (heights[i] - heights[j]) * (corners[j] - corners[i]));
+        }
+    }
+    kept
+}
+
 /// Form factor from the differential area at `point` with unit `normal` to the polygon `corners`, which emits towards
 /// the side from which its corners run counter-clockwise. Zero when the point is behind it.
 pub fn point_to_polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     let Some(first) = corners.first() else { return 0.0 };
     // Behind the emitting side, or in its plane: nothing arrives.
-    let twice: DVec3 = corners[1..].windows(2).map(|pair| (pair[0] - *first).cross(pair[1] - *first)).sum();
-    if twice.dot(*first - point) >= 0.0 { 0.0 } else { around(point, normal, corners) }
+    if twice_area(corners).dot(*first - point) >= 0.0 { 0.0 } else { around(point, normal, corners) }
 }
 
 /// [`point_to_polygon`] for a triangle.
@@ -52,6 +74,20 @@ fn around(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     }
     if let (Some(set), Some(risen)) = (set, risen) {
         sum += contour(set, risen, normal);
+    }
+    (sum / std::f64::consts::TAU).max(0.0)
+}
+
+/// Lambert's formula for a polygon above the horizon of `point`, which it faces. Nothing is looked at that could be
+/// clipped: the innermost loop of what cuts shadows.
+#[inline]
+pub(crate) fn point_to_polygon_above(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
+    let mut sum = 0.0;
+    let mut a = corners[corners.len() - 1] - point;
+    for corner in corners {
+        let b = *corner - point;
+        sum += contour(a, b, normal);
+        a = b;
     }
     (sum / std::f64::consts::TAU).max(0.0)
 }

@@ -14,7 +14,7 @@
 
 use crate::pair::Occlusion;
 use crate::pair::shadow::visible;
-use crate::polygon::point_to_triangle;
+use crate::polygon::{above, point_to_triangle, twice_area};
 use glam::DVec3;
 use radiosity_scene::Facet;
 use std::f64::consts::PI;
@@ -131,7 +131,7 @@ impl View {
             };
             let blockers = self.before(blockers);
             let blockers: Vec<&[DVec3]> = blockers.iter().map(Vec::as_slice).collect();
-            for piece in visible(DVec3::ZERO, &above([a, b, c], heights), &blockers) {
+            for piece in visible(DVec3::ZERO, &above(&[a, b, c], &heights), &blockers) {
                 let piece: Vec<Corner> = piece.into_iter().map(to_hats).collect();
                 for k in 1..piece.len().saturating_sub(1) {
                     self.add([piece[0], piece[k], piece[k + 1]], height, occlusion, &mut sum);
@@ -214,25 +214,10 @@ impl View {
     fn before(&self, blockers: &[&[DVec3]]) -> Vec<Vec<DVec3>> {
         let relative = blockers.iter().map(|blocker| blocker.iter().map(|c| *c - self.point).collect::<Vec<_>>());
         let is_before = |blocker: &Vec<DVec3>| {
-            let twice: DVec3 = blocker[1..].windows(2).map(|c| (c[0] - blocker[0]).cross(c[1] - blocker[0])).sum();
+            let twice = twice_area(blocker);
             let extent = blocker.iter().map(|c| c.length()).fold(0.0, f64::max);
             blocker[0].dot(twice).abs() > IN_PLANE * extent * twice.length()
         };
         relative.filter(is_before).collect()
     }
-}
-
-/// The part of a triangle above the horizon, from the heights of its corners.
-fn above(corners: [DVec3; 3], heights: [f64; 3]) -> Vec<DVec3> {
-    let mut kept = Vec::with_capacity(4);
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        if heights[i] >= 0.0 {
-            kept.push(corners[i]);
-        }
-        if heights[i] * heights[j] < 0.0 {
-            kept.push(corners[i] + heights[i] / (heights[i] - heights[j]) * (corners[j] - corners[i]));
-        }
-    }
-    kept
 }

@@ -237,11 +237,8 @@ fn widest(v: DVec3) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pair::polygons::facet;
     use radiosity_trace::sampling::Random;
-
-    fn facet(corners: &[[f64; 3]]) -> Facet {
-        Facet::new(corners.iter().map(|c| DVec3::from_array(*c)).collect()).unwrap()
-    }
 
     fn wall() -> Facet {
         facet(&[[1., 0., 0.], [1., 1., 0.], [1., 1., 1.], [1., 0., 1.]])

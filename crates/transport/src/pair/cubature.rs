@@ -14,7 +14,7 @@ use super::segments::Segments;
 use super::shadow::{cut_where_standing, seen};
 use super::smooth::gap;
 use super::{Factor, Occlusion, Pair};
-use crate::polygon::point_to_polygon;
+use crate::polygon::{point_to_polygon, twice_area};
 use glam::DVec3;
 use radiosity_scene::Facet;
 use std::cmp::Ordering;
@@ -84,8 +84,7 @@ impl Pair for Cubature {
 
 /// Area of a convex polygon.
 fn area(corners: &[DVec3]) -> f64 {
-    let twice: DVec3 = corners[1..].windows(2).map(|c| (c[0] - corners[0]).cross(c[1] - corners[0])).sum();
-    0.5 * twice.length()
+    0.5 * twice_area(corners).length()
 }
 
 /// What is integrated over.
@@ -255,30 +254,18 @@ mod tests {
     use crate::pair::Unoccluded;
     use crate::pair::blockers::Blockers;
     use crate::pair::exact::exact;
+    use crate::pair::polygons::{ceiling, floor, parallelogram};
     use crate::pair::sampled::Malley;
-
-    fn rectangle(origin: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Facet {
-        let [o, u, v] = [origin, u, v].map(DVec3::from_array);
-        Facet::new(vec![o, o + u, o + u + v, o + v]).unwrap()
-    }
-
-    fn floor() -> Facet {
-        rectangle([0., 0., 0.], [1., 0., 0.], [0., 1., 0.])
-    }
-
-    fn ceiling() -> Facet {
-        rectangle([0., 0., 1.], [0., 1., 0.], [1., 0., 0.])
-    }
 
     /// The tolerance is kept decade by decade, apart, touching, hinged and across planes.
     #[test]
     fn catalogue_17_the_tolerance_is_kept() {
         let others = [
             ceiling(),
-            rectangle([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]),
-            rectangle([0., 0., 0.], [0., 1., 0.], [0.9, 0., 0.1]),
-            rectangle([0.5, -1., -0.5], [0., 3., 0.], [-1., 0.3, 1.]),
-            rectangle([1., 1., 0.], [0.7, 0.2, 0.], [-0.3, 0.4, 1.]),
+            parallelogram([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]),
+            parallelogram([0., 0., 0.], [0., 1., 0.], [0.9, 0., 0.1]),
+            parallelogram([0.5, -1., -0.5], [0., 3., 0.], [-1., 0.3, 1.]),
+            parallelogram([1., 1., 0.], [0.7, 0.2, 0.], [-0.3, 0.4, 1.]),
         ];
         for other in others {
             for (a, b) in [(floor(), other.clone()), (other, floor())] {
@@ -297,7 +284,7 @@ mod tests {
     #[test]
     fn catalogue_18_a_square_between_squares() {
         for (low, truth) in [(0.0, 0.149_868_671_8), (0.25, 0.099_506_294_6)] {
-            let blocker = Blockers::new([&rectangle([low, low, 0.5], [0.5, 0., 0.], [0., 0.5, 0.])]);
+            let blocker = Blockers::new([&parallelogram([low, low, 0.5], [0.5, 0., 0.], [0., 0.5, 0.])]);
             for k in 1..6 {
                 let tolerance = 0.1_f64.powi(k);
                 let factor = Cubature { tolerance, ..Cubature::default() }.factor(&floor(), &ceiling(), &blocker);
@@ -323,8 +310,8 @@ mod tests {
         let mut partial = 0;
         for k in 0..40 {
             let mut vector = |size: f64| [next(-size, size), next(-size, size), next(-size, size)];
-            let to = rectangle([0.5, 0.5, 1.5], vector(1.0), vector(1.0));
-            let blocker = Blockers::new([&rectangle([0.5, 0.5, 0.7], vector(0.6), vector(0.6))]);
+            let to = parallelogram([0.5, 0.5, 1.5], vector(1.0), vector(1.0));
+            let blocker = Blockers::new([&parallelogram([0.5, 0.5, 0.7], vector(0.6), vector(0.6))]);
             let free = exact(&floor(), &to);
             let at = |tolerance: f64, occlusion: &dyn Occlusion| {
                 let factor = Cubature { tolerance, ..Cubature::default() }.factor(&floor(), &to, occlusion);
@@ -377,7 +364,7 @@ mod tests {
             let gap = if k % 2 == 0 { 10f64.powf(next(-6.0, 0.0)) } else { next(-0.5, 1.5) };
             let mut vector = |size: f64| [next(-size, size), next(-size, size), next(-size, size)];
             let [x, y, _] = vector(1.0);
-            let to = rectangle([x, y, gap], vector(size), vector(size));
+            let to = parallelogram([x, y, gap], vector(size), vector(size));
             let truth = exact(&floor(), &to);
             for tolerance in [1e-2, 1e-4, 1e-6, 1e-8] {
                 let factor = Cubature { tolerance, ..Cubature::default() }.factor(&floor(), &to, &Unoccluded);
@@ -389,7 +376,7 @@ mod tests {
 
     #[test]
     fn an_exhausted_budget_shows_in_the_error() {
-        let wall = rectangle([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
+        let wall = parallelogram([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
         let factor = Cubature { tolerance: 1e-12, budget: 200 }.factor(&floor(), &wall, &Unoccluded);
         let off = (factor.value - exact(&floor(), &wall)).abs();
         assert!(factor.error > 1e-12 && off <= factor.error, "{off:e} {factor:?}");

@@ -102,8 +102,7 @@ pub(super) fn touch(a: &Facet, b: &Facet) -> f64 {
     TOUCH * size(a).max(size(b))
 }
 
-/// The part of a polygon before a plane (Sutherland and Hodgman 1974). Corners less than `touch` from the plane are in
-/// it. A concave polygon may come back in pieces joined along the plane, where both ways cancel.
+/// The part of a polygon before a plane; corners less than `touch` from the plane are in it. As [`polygon::above`].
 pub(super) fn before(corners: &[DVec3], point: DVec3, normal: DVec3, touch: f64) -> Option<Vec<DVec3>> {
     let heights = corners.iter().map(|c| {
         let height = (*c - point).dot(normal);
@@ -116,18 +115,7 @@ pub(super) fn before(corners: &[DVec3], point: DVec3, normal: DVec3, touch: f64)
     if heights.iter().all(|h| *h >= 0.0) {
         return Some(corners.to_vec());
     }
-    let n = corners.len();
-    let mut kept = Vec::with_capacity(n + 2);
-    for i in 0..n {
-        let j = (i + 1) % n;
-        if heights[i] >= 0.0 {
-            kept.push(corners[i]);
-        }
-        if heights[i] * heights[j] < 0.0 {
-            kept.push(corners[i] + heights[i] / (heights[i] - heights[j]) * (corners[j] - corners[i]));
-        }
-    }
-    Some(kept)
+    Some(polygon::above(corners, &heights))
 }
 
 /// A polygon with what the methods ask of it.
@@ -220,12 +208,9 @@ fn over_smaller_area(small: &Outline, large: &Outline) -> f64 {
 mod tests {
     use super::*;
     use crate::pair::Unoccluded;
+    use crate::pair::polygons::{facet, moved};
     use glam::DQuat;
     use radiosity_trace::sampling::Random;
-
-    fn facet(corners: &[[f64; 3]]) -> Facet {
-        Facet::new(corners.iter().map(|c| DVec3::from_array(*c)).collect()).unwrap()
-    }
 
     /// The rectangle on the floor over x and y.
     fn floor(x: [f64; 2], y: [f64; 2]) -> Facet {
@@ -235,10 +220,6 @@ mod tests {
     /// The rectangle on the wall x = 0 over y and z, active towards +x.
     fn wall(y: [f64; 2], z: [f64; 2]) -> Facet {
         facet(&[[0., y[0], z[0]], [0., y[1], z[0]], [0., y[1], z[1]], [0., y[0], z[1]]])
-    }
-
-    fn moved(facet: &Facet, turn: DQuat, shift: DVec3) -> Facet {
-        Facet::new(facet.corners().iter().map(|c| turn * *c + shift).collect()).unwrap()
     }
 
     fn ceiling(height: f64) -> Facet {

@@ -135,14 +135,10 @@ impl FromStr for PairMethod {
 mod tests {
     use super::*;
     use crate::pair::blockers::Blockers;
+    use crate::pair::polygons::parallelogram;
     use crate::pair::{Occlusion, Unoccluded};
     use glam::DVec3;
     use radiosity_scene::Facet;
-
-    fn rectangle(origin: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Facet {
-        let [o, u, v] = [origin, u, v].map(DVec3::from_array);
-        Facet::new(vec![o, o + u, o + u + v, o + v]).unwrap()
-    }
 
     #[test]
     fn names_are_read_back() {
@@ -159,18 +155,18 @@ mod tests {
     /// cases.
     #[test]
     fn catalogue_91_methods_agree_within_their_errors() {
-        let floor = rectangle([0., 0., 0.], [1., 0., 0.], [0., 1., 0.]);
+        let floor = parallelogram([0., 0., 0.], [1., 0., 0.], [0., 1., 0.]);
         let l = [[0., 0.], [0., 2.], [1., 2.], [1., 1.], [2., 1.], [2., 0.]];
         let concave = Facet::new(l.iter().map(|[x, y]| DVec3::new(*x, *y, 1.2)).collect()).unwrap();
-        let ceiling = rectangle([0., 0., 1.], [0., 1., 0.], [1., 0., 0.]);
-        let half = Blockers::new([&rectangle([0.25, 0.25, 0.5], [0.5, 0., 0.], [0., 0.5, 0.])]);
-        let fin = Blockers::new([&rectangle([0.2, 0.2, 0.2], [0.4, 0., 0.], [0., 0.6, 0.])]);
-        let lid = Blockers::new([&rectangle([-1., -1., 0.5], [3., 0., 0.], [0., 3., 0.])]);
-        let wall = rectangle([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
+        let ceiling = parallelogram([0., 0., 1.], [0., 1., 0.], [1., 0., 0.]);
+        let half = Blockers::new([&parallelogram([0.25, 0.25, 0.5], [0.5, 0., 0.], [0., 0.5, 0.])]);
+        let fin = Blockers::new([&parallelogram([0.2, 0.2, 0.2], [0.4, 0., 0.], [0., 0.6, 0.])]);
+        let lid = Blockers::new([&parallelogram([-1., -1., 0.5], [3., 0., 0.], [0., 3., 0.])]);
+        let wall = parallelogram([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
         let cases: [(&str, Facet, Facet, &dyn Occlusion); 9] = [
             ("opposite", floor.clone(), ceiling.clone(), &Unoccluded),
-            ("far", floor.clone(), rectangle([2., 3., 6.], [0., 1., 0.5], [1.5, 0., -1.]), &Unoccluded),
-            ("tilted", floor.clone(), rectangle([0.3, -2., 0.5], [0.5, 0.1, 0.2], [0.1, 0.8, 1.]), &Unoccluded),
+            ("far", floor.clone(), parallelogram([2., 3., 6.], [0., 1., 0.5], [1.5, 0., -1.]), &Unoccluded),
+            ("tilted", floor.clone(), parallelogram([0.3, -2., 0.5], [0.5, 0.1, 0.2], [0.1, 0.8, 1.]), &Unoccluded),
             ("concave", floor.clone(), concave.clone(), &Unoccluded),
             ("from concave", concave, floor.clone(), &Unoccluded),
             ("half hidden", floor.clone(), ceiling.clone(), &half),
@@ -198,10 +194,10 @@ mod tests {
     /// What is obstructed never exceeds what is not by more than points drawn at random make it.
     #[test]
     fn catalogue_18_obstructed_is_never_more() {
-        let floor = rectangle([0., 0., 0.], [1., 0., 0.], [0., 1., 0.]);
-        let ceiling = rectangle([0., 0., 1.], [0., 1., 0.], [1., 0., 0.]);
+        let floor = parallelogram([0., 0., 0.], [1., 0., 0.], [0., 1., 0.]);
+        let ceiling = parallelogram([0., 0., 1.], [0., 1., 0.], [1., 0., 0.]);
         for x in [-0.4, 0.0, 0.3, 0.9, 1.2] {
-            let blocker = Blockers::new([&rectangle([x, 0.1, 0.5], [0.4, 0., 0.], [0., 0.5, 0.])]);
+            let blocker = Blockers::new([&parallelogram([x, 0.1, 0.5], [0.4, 0., 0.], [0., 0.5, 0.])]);
             for method in PAIRS {
                 let method = method.build();
                 let free = method.factor(&floor, &ceiling, &Unoccluded).value;

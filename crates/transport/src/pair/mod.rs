@@ -14,6 +14,8 @@ pub mod lambert;
 mod methods;
 pub mod nusselt;
 pub mod point;
+#[cfg(test)]
+mod polygons;
 pub mod sampled;
 mod segments;
 pub(crate) mod shadow;

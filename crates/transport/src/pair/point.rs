@@ -39,16 +39,9 @@ mod tests {
     use crate::pair::Unoccluded;
     use crate::pair::blockers::Blockers;
     use crate::pair::exact::exact;
+    use crate::pair::polygons::{moved, rectangle};
     use glam::{DQuat, DVec3};
     use radiosity_trace::sampling::Random;
-
-    fn rectangle(x: f64, y: f64) -> Facet {
-        Facet::new(vec![DVec3::ZERO, DVec3::new(x, 0., 0.), DVec3::new(x, y, 0.), DVec3::new(0., y, 0.)]).unwrap()
-    }
-
-    fn moved(facet: &Facet, turn: DQuat, shift: DVec3) -> Facet {
-        Facet::new(facet.corners().iter().map(|c| turn * *c + shift).collect()).unwrap()
-    }
 
     fn above(height: f64) -> Facet {
         moved(&rectangle(1.0, 1.0).flipped(), DQuat::IDENTITY, DVec3::Z * height)

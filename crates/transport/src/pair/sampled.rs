@@ -182,19 +182,7 @@ mod tests {
     use crate::pair::Unoccluded;
     use crate::pair::blockers::Blockers;
     use crate::pair::exact::exact;
-
-    fn rectangle(origin: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Facet {
-        let [o, u, v] = [origin, u, v].map(DVec3::from_array);
-        Facet::new(vec![o, o + u, o + u + v, o + v]).unwrap()
-    }
-
-    fn floor() -> Facet {
-        rectangle([0., 0., 0.], [1., 0., 0.], [0., 1., 0.])
-    }
-
-    fn ceiling() -> Facet {
-        rectangle([0., 0., 1.], [0., 1., 0.], [1., 0., 0.])
-    }
+    use crate::pair::polygons::{ceiling, floor, parallelogram};
 
     fn methods(seed: u32, samples: u32) -> [(&'static str, Box<dyn Pair>); 3] {
         [
@@ -208,8 +196,8 @@ mod tests {
     /// each method and pair; the seeds are fixed), and the stated errors cover all but a few in a hundred.
     #[test]
     fn catalogue_28_unbiased_with_honest_errors() {
-        let wall = rectangle([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
-        let tilted = rectangle([0.3, -2., 0.5], [0.5, 0.1, 0.2], [0.1, 0.8, 1.]);
+        let wall = parallelogram([0., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
+        let tilted = parallelogram([0.3, -2., 0.5], [0.5, 0.1, 0.2], [0.1, 0.8, 1.]);
         let concave = Facet::new(
             [[0., 0.], [0., 2.], [1., 2.], [1., 1.], [2., 1.], [2., 0.]]
                 .iter()
@@ -217,7 +205,7 @@ mod tests {
                 .collect(),
         )
         .unwrap();
-        let blocker = Blockers::new([&rectangle([0.25, 0.25, 0.5], [0.5, 0., 0.], [0., 0.5, 0.])]);
+        let blocker = Blockers::new([&parallelogram([0.25, 0.25, 0.5], [0.5, 0., 0.], [0., 0.5, 0.])]);
         let free = |to: &Facet| exact(&floor(), to);
         let cases: [(Facet, &dyn Occlusion, f64); 5] = [
             (ceiling(), &Unoccluded, free(&ceiling())),
@@ -277,7 +265,7 @@ mod tests {
 
     #[test]
     fn nothing_seen_is_no_certainty() {
-        let speck = rectangle([0.5, 0.5, 50.], [0., 1e-3, 0.], [1e-3, 0., 0.]);
+        let speck = parallelogram([0.5, 0.5, 50.], [0., 1e-3, 0.], [1e-3, 0., 0.]);
         let factor = Malley::default().factor(&floor(), &speck, &Unoccluded);
         assert!(factor.value == 0.0 && factor.error >= exact(&floor(), &speck), "{factor:?}");
         assert_eq!(Malley::default().factor(&floor(), &ceiling().flipped(), &Unoccluded).value, 0.0);

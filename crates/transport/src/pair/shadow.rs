@@ -4,7 +4,7 @@
 //! blocker. A convex polygon is cut along each plane in turn; what lies outside one of them, or before the blocker, is
 //! seen; what is left after all is hidden (Weiler and Atherton 1977, by way of planes in space).
 
-use crate::polygon::point_to_polygon;
+use crate::polygon::{above, point_to_polygon, twice_area};
 use glam::DVec3;
 
 /// Distance from a plane below which a corner is in it, relative to the distance from the point: rounding.
@@ -30,8 +30,7 @@ pub fn cut_where_standing(polygons: &[Vec<DVec3>], plane: (DVec3, DVec3), blocke
     };
     let mut parts = polygons.to_vec();
     for blocker in blockers.iter().filter(stands).take(CUTS) {
-        let twice: DVec3 = blocker[1..].windows(2).map(|c| (c[0] - blocker[0]).cross(c[1] - blocker[0])).sum();
-        let Some(across) = twice.try_normalize() else { continue };
+        let Some(across) = twice_area(blocker).try_normalize() else { continue };
         let halves = |part: &Vec<DVec3>| split(part, across, blocker[0].dot(across));
         parts = parts.iter().flat_map(halves).filter(|part| part.len() > 2).collect();
     }
@@ -49,8 +48,7 @@ pub fn visible(point: DVec3, polygon: &[DVec3], blockers: &[&[DVec3]]) -> Vec<Ve
     for blocker in blockers {
         // Relative to the point, and turned so that its normal points away from it.
         let corners: Vec<DVec3> = blocker.iter().map(|c| *c - point).collect();
-        let twice: DVec3 = corners[1..].windows(2).map(|c| (c[0] - corners[0]).cross(c[1] - corners[0])).sum();
-        let Some(normal) = twice.try_normalize() else { continue };
+        let Some(normal) = twice_area(&corners).try_normalize() else { continue };
         let height = normal.dot(corners[0]);
         if height.abs() <= TOUCH * corners[0].length() {
             continue;
@@ -101,22 +99,8 @@ fn split(polygon: &[DVec3], normal: DVec3, offset: f64) -> [Vec<DVec3>; 2] {
     if heights.iter().all(|h| *h >= 0.0) {
         return [polygon.to_vec(), Vec::new()];
     }
-    let (mut above, mut below) = (Vec::with_capacity(polygon.len() + 1), Vec::with_capacity(polygon.len() + 1));
-    for (i, p) in polygon.iter().enumerate() {
-        let j = (i + 1) % polygon.len();
-        if heights[i] >= 0.0 {
-            above.push(*p);
-        }
-        if heights[i] <= 0.0 {
-            below.push(*p);
-        }
-        if heights[i] * heights[j] < 0.0 {
-            let cut = *p + heights[i] / (heights[i] - heights[j]) * (polygon[j] - *p);
-            above.push(cut);
-            below.push(cut);
-        }
-    }
-    [above, below]
+    let below: Vec<f64> = heights.iter().map(|h| -h).collect();
+    [above(polygon, &heights), above(polygon, &below)]
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! taken. Λ is Lambert's contour integral (1760).
 
 use super::panel::Panel;
+pub(crate) use crate::polygon::point_to_polygon_above as lambert;
 use glam::DVec3;
 use smallvec::SmallVec;
 use std::cmp::Ordering;
@@ -207,21 +208,4 @@ pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
     }
     *polygon = kept;
     polygon.len() >= 3
-}
-
-/// Lambert's contour integral of a polygon above the horizon whose corners run counter-clockwise about its own normal,
-/// which faces x.
-pub fn lambert(x: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
-    let mut sum = 0.0;
-    let mut a = polygon[polygon.len() - 1] - x;
-    for corner in polygon {
-        let b = *corner - x;
-        let cross = b.cross(a);
-        let sine = cross.length();
-        if sine > 0.0 {
-            sum += sine.atan2(a.dot(b)) / sine * cross.dot(normal);
-        }
-        a = b;
-    }
-    (sum / std::f64::consts::TAU).max(0.0)
 }
