@@ -6,6 +6,7 @@ use crate::{Failure, Global, numbers};
 use clap::{Args, ValueEnum};
 use radiosity::io::vs3::NoRow;
 use radiosity::io::{FactorFormat, FactorRows, FactorTable, Grouping, LoadOptions, Vs3, enclosure_of, load_enclosure};
+use radiosity::transport::row::{MOST_CELLS, RowMethod};
 use radiosity::transport::{FormFactorMethod, FormFactors};
 use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Severity, counted};
 use serde_json::json;
@@ -36,9 +37,9 @@ pub struct Arguments {
     /// not hidden at all is found to 1e-9 or better.
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = numbers::positive)]
     accuracy: Option<f64>,
-    /// Cells along a side of the surface that hemicube and its like project on, 256 by default; `hemisphere` casts the square
-    /// of it rays.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=4096))]
+    /// Cells along a side of the surface that hemicube and its like project on, an even number from 4 to 2048, 256 by
+    /// default; `hemisphere` casts the square of it rays, or the next power of two, up to 4096².
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(4..=4096))]
     resolution: Option<u16>,
     /// Make rows sum to one by moving uncertain factors, and no others.
     #[arg(long)]
@@ -73,6 +74,9 @@ const SHOWN: usize = 20;
 /// Share of entries that are not zero up to which a matrix is written as a sparse one, and surfaces from which on.
 const SPARSE: (f64, usize) = (0.3, 1000);
 
+/// Bytes of an element as a facet with its name, before there are any factors; about twice what it takes.
+const ELEMENT: usize = 512;
+
 struct Input {
     enclosure: Enclosure,
     vs3: Option<Vs3>,
@@ -94,6 +98,7 @@ impl Arguments {
     fn refuse_what_has_no_effect(&self) -> Result<(), Failure> {
         let method = self.method;
         let [adaptive, projects] = [method == FormFactorMethod::Adaptive, matches!(method, FormFactorMethod::Row(_))];
+        let casts_rays = method == FormFactorMethod::Row(RowMethod::Hemisphere);
         let by_element = self.by == Some(By::Element);
         let rules = [
             (self.by.is_some() && self.is("vs3"), "--by is for scenes: a .vs3 has its own surfaces".to_owned()),
@@ -113,6 +118,10 @@ impl Arguments {
             (
                 self.resolution.is_some() && !projects,
                 format!("--resolution is for methods that project, such as hemicube: {method} does not"),
+            ),
+            (
+                self.resolution.is_some_and(|n| n > MOST_CELLS || n % 2 > 0) && !casts_rays,
+                format!("--resolution of {method} must be even and at most {MOST_CELLS}"),
             ),
         ];
         match rules.into_iter().find(|(has_no_effect, _)| *has_no_effect) {
@@ -153,6 +162,13 @@ fn read(arguments: &Arguments) -> Result<Input, Failure> {
                 return Err(Failure::input("--by element needs --element-size: width of elements in metres"));
             };
             let mesh = Mesh::new(&scene);
+            let count = Elements::count(&scene, &mesh, size);
+            if count.saturating_mul(ELEMENT) > arguments.memory {
+                return Err(Failure::input(format!(
+                    "{count} elements take more than the {} allowed (allow more, or use a larger --element-size)",
+                    radiosity::size(arguments.memory)
+                )));
+            }
             let elements = Elements::new(&scene, &mesh, size);
             Enclosure::of_elements(&mesh, &elements).map_err(Failure::input)?
         } else {

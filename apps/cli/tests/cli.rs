@@ -709,6 +709,8 @@ fn factors_refuse_what_makes_no_sense() {
     refused(&["squares.vs3", "--by", "object"], "--by is for scenes");
     refused(&["squares.vs3", "--resolution", "64"], "adaptive does not");
     refused(&["squares.vs3", "--resolution", "64", "--method", "lambert"], "lambert does not");
+    refused(&["squares.vs3", "--resolution", "4096", "--method", "hemicube"], "even and at most 2048");
+    refused(&["squares.vs3", "--resolution", "65", "--method", "single-plane"], "even and at most 2048");
     refused(&["squares.vs3", "--accuracy", "1e-3", "--method", "hemicube"], "hemicube is as exact as it is");
     refused(&["--unit", "mm"], "--unit is for");
     refused(&["--element-size", "0.1"], "--by element");
@@ -717,6 +719,11 @@ fn factors_refuse_what_makes_no_sense() {
         "than the 1.0 KB allowed",
     );
     refused(&["--by", "element"], "--element-size");
+    // Elements that take more than memory before a factor is asked for.
+    refused(
+        &["--by", "element", "--element-size", "1e-9", "--memory", "64M"],
+        "elements take more than the 64 MB allowed",
+    );
     refused(&["--script-f"], "emittance");
     refused(&["--by", "element", "--element-size", "0.02", "--memory", "1M"], "allow more");
     assert_eq!(room.names(), ["broken.vs3", "squares.vs3"]);

@@ -39,7 +39,7 @@ impl RowMethod {
     }
 
     fn entry(self) -> (RowMethod, &'static str, &'static str) {
-        TABLE.into_iter().find(|(method, _, _)| *method == self).unwrap_or(TABLE[0])
+        TABLE.into_iter().find(|(method, _, _)| *method == self).expect("every method has a line in the table")
     }
 
     /// As users write it.
@@ -74,10 +74,12 @@ impl fmt::Display for RowMethod {
 
 /// No row method has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "no row method is called \"{0}\"; there are hemicube, hemicube-midpoint, single-plane, cubic-tetrahedron, global-cube and hemisphere"
-)]
+#[error("no row method is called \"{0}\"; there are {known}", known = names())]
 pub struct UnknownRowMethod(pub String);
+
+fn names() -> String {
+    TABLE.map(|(_, name, _)| name).join(", ")
+}
 
 impl FromStr for RowMethod {
     type Err = UnknownRowMethod;

@@ -28,6 +28,7 @@ pub use look::{Look, Repair};
 pub use matrix::RowMatrix;
 pub use method::{RowMethod, UnknownRowMethod};
 pub use single_plane::SinglePlane;
+pub use surface::MOST_CELLS;
 
 use crate::pair::Factor;
 use crate::{Progress, Stopped};

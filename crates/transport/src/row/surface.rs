@@ -6,7 +6,10 @@ use glam::DVec3;
 use std::sync::OnceLock;
 
 /// Cells along a side beyond which refinement stops: a row then takes some seconds.
-const MOST_CELLS: usize = 1024;
+const REFINED: usize = 1024;
+
+/// Most cells along a side of a projection surface: four million on a face, which are 100 MB.
+pub const MOST_CELLS: u16 = 2048;
 
 /// A method that projects what is around on faces.
 pub(super) trait Projection: Sync {
@@ -46,7 +49,7 @@ pub(super) struct Atlas<'a> {
 impl Atlas<'_> {
     pub fn new(projection: &dyn Projection) -> Atlas<'_> {
         let resolution = resolution_of(projection);
-        let finer = (1..).take_while(|level| resolution << level <= MOST_CELLS).count();
+        let finer = (1..).take_while(|level| resolution << level <= REFINED).count();
         Atlas { projection, levels: (0..2 + finer).map(|_| OnceLock::new()).collect() }
     }
 
@@ -70,9 +73,9 @@ impl Atlas<'_> {
     }
 }
 
-/// An even number of at least four cells, and no more than memory allows.
+/// An even number of cells from 4 to [`MOST_CELLS`].
 fn resolution_of(projection: &dyn Projection) -> usize {
-    projection.look().resolution.clamp(4, 2 * MOST_CELLS).next_multiple_of(2)
+    projection.look().resolution.clamp(4, usize::from(MOST_CELLS)).next_multiple_of(2)
 }
 
 impl Level {
