@@ -721,8 +721,8 @@ fn factors_refuse_what_makes_no_sense() {
     refused(&["--by", "element"], "--element-size");
     // Elements that take more than memory before a factor is asked for.
     refused(
-        &["--by", "element", "--element-size", "1e-9", "--memory", "64M"],
-        "elements take more than the 64 MB allowed",
+        &["--by", "element", "--element-size", "1e-9", "--memory", "16M"],
+        "elements take more than the 16 MB allowed",
     );
     refused(&["--script-f"], "emittance");
     refused(&["--by", "element", "--element-size", "0.02", "--memory", "1M"], "allow more");
