@@ -15,6 +15,7 @@ pub mod material;
 pub mod mesh;
 pub mod scene;
 pub mod sky;
+pub mod spectrum;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
@@ -27,6 +28,7 @@ pub use material::{AlphaMode, Material, TextureRef};
 pub use mesh::{Mesh, Side};
 pub use scene::{Object, Scene, Source, Surface, Up};
 pub use sky::{Sky, SkyPatches};
+pub use spectrum::{Illuminant, SpectralBands, SpectrumError};
 pub use texture::{Texture, Wrap};
 
 /// One value per colour band (linear Rec.709 red, green, blue), the way every spectral quantity is carried.
