@@ -19,6 +19,7 @@ pub mod receivers;
 pub mod row;
 pub mod rows;
 pub mod view_factors;
+pub mod zones;
 
 pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;
@@ -31,6 +32,7 @@ pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers
 pub use row::{Row, RowFactors};
 pub use rows::{HitTable, IdSpace};
 pub use view_factors::FactorError;
+pub use zones::{Zone, ZoneExchange, ZoneOptions, zone_exchange};
 
 /// Tells a long computation's progress and may end it.
 pub trait Progress: Sync {

@@ -9,7 +9,7 @@ pub mod contour;
 pub mod cubature;
 mod edges;
 pub mod exact;
-mod gauss;
+pub(crate) mod gauss;
 pub mod lambert;
 mod methods;
 pub mod nusselt;

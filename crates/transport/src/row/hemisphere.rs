@@ -10,24 +10,19 @@
 //! enclosure, which moves edges by 1e-7 of its extent. It fails on small factors: off by √(F/M); errors fall with
 //! M^-¾ from small facets, with M^-⅝ from large ones, where edges run through all four dimensions of the points.
 
-use super::points::{Places, is_coplanar};
+use super::around::Around;
+use super::points::Places;
 use super::{Look, Repair, Row, RowFactors, RowMatrix};
 use crate::pair::Factor;
 use crate::{Progress, Stopped};
-use glam::DVec3;
-use radiosity_scene::{Enclosure, Facet};
+use radiosity_scene::Enclosure;
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
-use radiosity_trace::{Ray, Tree};
 
 /// The stream of sample points.
 const STREAM: u32 = 0x0201;
 
 /// Rays beyond which [`Repair::UntilError`] gives up: a row then takes some ten seconds.
 const MOST_RAYS: usize = 1 << 24;
-
-/// Places are drawn this much towards the facet's centre, relative to the coordinates, so that rounding puts none behind a
-/// wall that the facet touches: four units in the last place.
-const INWARDS: f64 = 4.0 / (1u32 << 24) as f64;
 
 /// Standard errors that the error of a factor covers.
 const DEVIATIONS: f64 = 3.0;
@@ -50,34 +45,6 @@ impl Default for Hemisphere {
     }
 }
 
-/// All that rays may meet.
-struct Around<'a> {
-    enclosure: &'a Enclosure,
-    tree: Tree,
-    /// Facet of each triangle; the number of facets for obstructions.
-    owner: Vec<u32>,
-    /// The middle of everything, and how far the farthest coordinate lies from it.
-    middle: DVec3,
-    reach: f64,
-}
-
-impl<'a> Around<'a> {
-    fn new(enclosure: &'a Enclosure) -> Around<'a> {
-        let [low, high] = enclosure.bounds().unwrap_or_default();
-        let middle = 0.5 * (low + high);
-        let (mut triangles, mut owner) = (Vec::new(), Vec::new());
-        let nothing = enclosure.facets.len();
-        let owners = (0..nothing).chain(std::iter::repeat(nothing));
-        for (facet, index) in enclosure.facets.iter().chain(&enclosure.obstructions).zip(owners) {
-            for triangle in facet.triangles() {
-                triangles.push(triangle.map(|c| (c - middle).as_vec3()));
-                owner.push(index as u32);
-            }
-        }
-        Around { enclosure, tree: Tree::new(&triangles), owner, middle, reach: (high - middle).max_element() }
-    }
-}
-
 /// What the rays of a row have met: by facet and half of the sequence, and last what shows nothing.
 struct Counts {
     hits: Vec<[u32; 2]>,
@@ -92,12 +59,11 @@ impl Hemisphere {
 
     fn trace(&self, around: &Around, from: usize) -> RowFactors {
         let own = &around.enclosure.facets[from];
-        let is_own = |facet: &Facet| is_coplanar(own, facet.corners().iter().copied());
-        let own_plane: Vec<bool> = around.enclosure.facets.iter().map(is_own).collect();
+        let own_plane = around.in_plane_of(own);
         let frame = frame(own.normal());
         let places = Places::new(own);
         let sequence = Sequence::new(hash(hash(self.seed) ^ from as u32), STREAM);
-        let inwards = 1.0 - (INWARDS * around.reach / own.radius()).min(0.01);
+        let inwards = around.inwards(own.radius());
         let nothing = around.enclosure.facets.len();
         let mut counts = Counts { hits: vec![[0; 2]; nothing + 1] };
         let mut rays = self.rays.clamp(2, MOST_RAYS).next_power_of_two();
@@ -107,14 +73,7 @@ impl Hemisphere {
                 let [u, v, x, y] = sequence.point(index as u32).map(f64::from);
                 let place = own.centroid() + inwards * (places.at(x, y) - own.centroid());
                 let direction = cosine_direction(&frame, u, v);
-                let origin = (place - around.middle).as_vec3();
-                let ray = Ray { origin, direction: direction.as_vec3(), t_max: f32::INFINITY, skip: u32::MAX };
-                let is_met = |triangle: u32, _, _, _| {
-                    let owner = around.owner[triangle as usize] as usize;
-                    !own_plane.get(owner).copied().unwrap_or(false)
-                };
-                let hit = around.tree.closest_where(&ray, is_met).filter(|hit| !hit.back);
-                let item = hit.map_or(nothing, |hit| around.owner[hit.triangle as usize] as usize);
+                let (item, _) = around.meets(place, direction, &own_plane);
                 counts.hits[item][index * 2 / rays] += 1;
             }
             traced = rays;
@@ -171,6 +130,8 @@ mod tests {
     use super::*;
     use crate::row::tests::{ADJACENT, OPPOSITE, box_of, room_with_block};
     use crate::row::view::View;
+    use glam::DVec3;
+    use radiosity_scene::Facet;
 
     /// Mean and spread over seeds against the exact factors of a cube: no bias (five standard errors, one false alarm in
     /// a million), never worse than independent rays, and better the more there are.

@@ -4,6 +4,7 @@
 //! fails (proximity, aliasing, truncation) and predicts by how much. [`RowMethod`] has them by name; those that project
 //! on faces share the item buffer (`buffer`), the weights of cells (`face`) and the bookkeeping of errors (`look`).
 
+pub(crate) mod around;
 mod buffer;
 mod cubic_tetrahedron;
 mod face;
@@ -14,7 +15,7 @@ mod hemisphere;
 mod look;
 mod matrix;
 mod method;
-mod points;
+pub(crate) mod points;
 mod single_plane;
 mod surface;
 mod view;

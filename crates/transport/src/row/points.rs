@@ -8,7 +8,7 @@ use radiosity_scene::Facet;
 const IN_PLANE: f64 = 1e-6;
 
 /// Whether all `corners` lie in the plane of a facet.
-pub(super) fn is_coplanar(facet: &Facet, corners: impl Iterator<Item = DVec3> + Clone) -> bool {
+pub(crate) fn is_coplanar(facet: &Facet, corners: impl Iterator<Item = DVec3> + Clone) -> bool {
     let Some(first) = corners.clone().next() else { return true };
     let extent = facet.radius() + corners.clone().map(|c| c.distance(first)).fold(0.0, f64::max);
     corners.into_iter().all(|c| facet.height(c).abs() <= IN_PLANE * extent)
@@ -73,7 +73,7 @@ fn middle(facet: &Facet) -> DVec3 {
 
 /// Places on a facet, uniform by area, from points of the unit square.
 #[derive(Clone, Debug)]
-pub(super) struct Places {
+pub(crate) struct Places {
     /// Triangles, and the share of the area up to the end of each.
     triangles: Vec<([DVec3; 3], f64)>,
 }

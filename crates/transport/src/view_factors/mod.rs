@@ -17,7 +17,9 @@ mod solid;
 mod store;
 mod visible;
 
+pub(crate) use clear::Exchange;
 pub use closure::{Closure, Repair};
+pub(crate) use store::Entry;
 pub use store::ViewFactors;
 
 use crate::{Progress, Stopped};
@@ -32,7 +34,6 @@ use serde::Serialize;
 use shaft::{Look, Shaft, Stands};
 use solid::{Obstacles, find_solids};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use store::Entry;
 use visible::Shadows;
 
 /// How exact the factors are to be, and what they may take.

@@ -8,7 +8,7 @@ use radiosity_scene::Enclosure;
 
 /// One exchange area between two facets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     /// The facets, the lower index first.
     pair: [u32; 2],
     value: f64,
@@ -35,7 +35,7 @@ pub struct ViewFactors {
 
 impl ViewFactors {
     /// From entries in any order; those of one pair are summed.
-    pub(super) fn new(areas: Vec<f64>, entries: impl Iterator<Item = Vec<Entry>>, choices: Choices) -> ViewFactors {
+    pub(crate) fn new(areas: Vec<f64>, entries: impl Iterator<Item = Vec<Entry>>, choices: Choices) -> ViewFactors {
         let n = areas.len();
         let chunks: Vec<Vec<Entry>> = entries.collect();
         // By counting: rows first, then each row by column.
