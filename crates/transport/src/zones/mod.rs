@@ -146,7 +146,7 @@ fn list(faults: &[ZoneFault]) -> String {
 /// solve(Solver::Lu, &exchange.transport()?, &response, &e, &mut b, &Params::default(), |_, _| Go::On)?;
 /// let (walls, gas) = exchange.net_loss(&b);
 /// assert!((gas[0] + walls.iter().sum::<f64>()).abs() < 1e-9);
-/// assert!((gas[0] / 6.0 - 0.467).abs() < 2e-3); // emissivity of a cube of optical edge 1
+/// assert!((gas[0] / 6.0 - 0.446).abs() < 2e-3); // the emissivity of a cube of optical edge 1
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
