@@ -220,12 +220,10 @@ impl<S: Shaded> Domain<'_, S> {
         } else {
             cell.least = [0, 1].map(|k| range(&|c| c.factors[k])).map(|(low, high)| bend * area * (high - low));
         }
-        for k in 0..2 {
-            let f = |c: &Sight| c.factors[k] - shares[k] * both(c);
-            cell.errors[k] = (area * (f(&centre) - mean(&f).0).abs() / 3.0).max(cell.least[k]);
-            if size.abs() == 1 << DEPTH {
-                cell.errors[k] *= UNDIVIDED;
-            }
+        let times = if size.abs() == 1 << DEPTH { UNDIVIDED } else { 1.0 };
+        for (k, share) in shares.into_iter().enumerate() {
+            let f = |c: &Sight| c.factors[k] - share * both(c);
+            cell.errors[k] = times * (area * (f(&centre) - mean(&f).0).abs() / 3.0).max(cell.least[k]);
         }
         let sees = |k: usize| corners.iter().chain([&centre]).map(|c| c.factors[k]).fold(0.0, f64::max);
         let (seen, hidden) = (sees(0), sees(1));
