@@ -293,6 +293,51 @@ fn surfaces_of_facets_are_as_exact_as_asked() {
     }
 }
 
+/// A wall between two rooms has a side in each: neither is hidden by the wall itself, and no light gets through.
+#[test]
+fn rooms_on_either_side_of_a_wall_are_closed() {
+    for n in [1, 2, 3] {
+        let mut rooms = Enclosure::default();
+        add_box(&mut rooms, [0.0; 3], [1.0; 3], n, true);
+        let of_first = rooms.facets.len();
+        add_box(&mut rooms, [1.0, 0.0, 0.0], [2.0, 1.0, 1.0], n, true);
+        rooms.obstructions.push(facet(&[[0.3, 0.4, 0.9], [0.3, 0.6, 0.9], [0.5, 0.6, 0.9], [0.5, 0.4, 0.9]]));
+        let factors = solve(&rooms, 1e-5);
+        let sums = factors.row_sums();
+        let facing = |i: usize| rooms.facets[i].normal().x < -0.5;
+        for i in 0..rooms.facets.len() {
+            let at_wall = facing(i) && i < of_first;
+            assert!(
+                if i < of_first { sums[i] > 0.5 && sums[i] < 1.0 + 1e-4 } else { (sums[i] - 1.0).abs() < 1e-6 },
+                "{n}: {i} {}",
+                sums[i]
+            );
+            assert!(!at_wall || sums[i] > 0.9, "{n}: {i} {}", sums[i]);
+            for j in 0..rooms.facets.len() {
+                let across = factors.factor(i, j);
+                assert!((i < of_first) == (j < of_first) || across.value <= 1e-9, "{n}: {i} {j} {across:?}");
+            }
+        }
+    }
+}
+
+/// Many staggered plates between two squares: what they leave is found without going through all ways in which they overlap.
+#[test]
+fn many_plates_that_overlap_are_one_shadow() {
+    let plate = |x: f64, z: f64| facet(&[[x, -0.1, z], [x + 0.3, -0.1, z], [x + 0.3, 0.7, z], [x, 0.7, z]]);
+    let squares = |plates: Vec<Facet>| {
+        let mut scene = Enclosure::default();
+        scene.add("floor", facet(&[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]));
+        scene.add("ceiling", facet(&[[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]]));
+        scene.obstructions = plates;
+        solve(&scene, 1e-3).factor(0, 1)
+    };
+    // Thirty plates close to one height stand for the one that they make up, but for their thickness.
+    let many = squares((0..30).map(|k| plate(-0.05 + 0.025 * f64::from(k), 0.5 + 1e-5 * f64::from(k))).collect());
+    let one = squares(vec![facet(&[[-0.05, -0.1, 0.5], [0.975, -0.1, 0.5], [0.975, 0.7, 0.5], [-0.05, 0.7, 0.5]])]);
+    assert!(one.value > 0.02 && (many.value - one.value).abs() <= many.error + one.error + 1e-4, "{many:?}, {one:?}");
+}
+
 /// Where a wall is missing, what is known stays and the gap is told.
 #[test]
 fn the_repair_does_not_close_a_gap() {

@@ -35,16 +35,15 @@ pub fn mixed(
         let normal = other.shape.normal();
         keep_above(&mut left, normal, normal.dot(other.shape.corners()[0])).then_some(left)
     };
-    let (Some(from), Some(target)) = (above(outer, inner), above(inner, outer)) else {
-        return Exchange::default();
-    };
-    let (Ok(from), Ok(to)) = (Facet::new(from.to_vec()), Facet::new(target.to_vec())) else {
-        return Exchange::default();
-    };
+    // Too thin a strip sees the other, or too much stands between for a list.
+    let unknown = Exchange { value: 0.5 * whole.value, error: 0.5 * whole.value + whole.error };
+    let (Some(from), Some(target)) = (above(outer, inner), above(inner, outer)) else { return unknown };
+    let (Ok(from), Ok(to)) = (Facet::new(from.to_vec()), Facet::new(target.to_vec())) else { return unknown };
     panels.retain(|panel| !looks_away(panel, obstacles, from.corners(), touch));
+    let Ok(count) = u16::try_from(panels.len()) else { return unknown };
     let middle = from.centroid();
     Shadows::sort(middle, outer.shape.normal(), &target, panels, touch);
-    let all: List = (0..panels.len().min(usize::from(u16::MAX)) as u16).collect();
+    let all: List = (0..count).collect();
     let mut view =
         View { shadows, panels, obstacles, middle, normal: outer.shape.normal(), target: &target, to: &to, touch };
     let found = integrate(&from, (whole.value, tolerance), &mut view, &all);

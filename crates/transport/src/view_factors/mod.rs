@@ -214,7 +214,8 @@ impl Walk<'_> {
             return;
         }
         let mut left: Vec<u32> = Vec::with_capacity(between.len());
-        let mut shaft = Shaft::new([&from.hull, &to.hull], [glam::DVec3::ZERO; 2], self.touch);
+        let normals = [from, to].map(|cluster| cluster.plane.map_or(glam::DVec3::ZERO, |(normal, _)| normal));
+        let mut shaft = Shaft::new([&from.hull, &to.hull], normals, self.touch);
         for &panel in between {
             let corners = &self.panels[panel as usize];
             if behind(&from.plane, &corners.corners) || behind(&to.plane, &corners.corners) {

@@ -56,7 +56,7 @@ type Plane = (DVec3, f64, f64);
 pub struct Shaft<'a> {
     /// Corners of either.
     ends: [&'a [DVec3]; 2],
-    /// Normals, if they are polygons: their corners run counter-clockwise about them.
+    /// Normals, if they are polygons: their corners run counter-clockwise about them. Zero for boxes.
     normals: [DVec3; 2],
     /// Distance below which points count as lying on a plane.
     touch: f64,
@@ -65,7 +65,7 @@ pub struct Shaft<'a> {
 }
 
 impl<'a> Shaft<'a> {
-    /// The shaft between two sets; the normals matter for polygons only.
+    /// The shaft between two sets; the normals of boxes are zero.
     pub fn new(ends: [&'a [DVec3]; 2], normals: [DVec3; 2], touch: f64) -> Shaft<'a> {
         debug_assert!(ends.iter().all(|end| end.len() <= MOST));
         Shaft { ends, normals, touch, sides: None }
@@ -97,7 +97,9 @@ impl<'a> Shaft<'a> {
             }
             all_within &= crossings.within;
         }
-        if all_within && is_parted {
+        // What lies in the panel itself looks away from it: a polygon only touches it there, a box may hold whole parts.
+        let is_off = |end: usize, h: &Over| self.normals[end] != DVec3::ZERO || h.iter().all(|h| h.abs() > touch);
+        if all_within && is_parted && is_off(0, &a) && is_off(1, &b) {
             return Stands::Across;
         }
         let is_beside = |(outwards, offset, reach): &Plane| {
@@ -151,7 +153,7 @@ impl Crossings {
                 if (*a > 0.0) != (*b > 0.0) {
                     let (length, within) = if *a > 0.0 { (a - b, a * f - b * e) } else { (b - a, b * e - a * f) };
                     self.outside &= within <= self.touch * length;
-                    self.within &= within >= 0.0;
+                    self.within &= within >= -self.touch * length;
                 }
             }
             if !(self.outside || self.within) {
@@ -164,7 +166,7 @@ impl Crossings {
     fn in_plane(&mut self, heights: &[f64], inside: &[f64]) {
         for (_, e) in heights.iter().zip(inside).filter(|(h, _)| h.abs() <= self.touch) {
             self.outside &= *e <= self.touch;
-            self.within &= *e >= 0.0;
+            self.within &= *e >= -self.touch;
         }
     }
 }

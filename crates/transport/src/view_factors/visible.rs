@@ -17,6 +17,10 @@ pub type Loop = SmallVec<[DVec3; 10]>;
 /// Heights below this are taken for zero, relative to the largest of the polygon: cuts along an edge leave no slivers.
 const ROUNDING: f64 = 1e-12;
 
+/// Shadows up to which each takes away what none before it has taken; of more, any two that overlap would double the work,
+/// and what they leave is cut into pieces.
+const FEW: usize = 8;
+
 /// What a panel hides from a point: all that has positive heights over these planes.
 type Shadow = SmallVec<[(DVec3, f64); 6]>;
 
@@ -57,17 +61,23 @@ impl Shadows {
         }
         let whole = lambert(x, normal, target);
         let (mut hidden_all, mut hiding) = (0.0, 0);
+        let are_many = self.of.len() > FEW;
         for (k, shadow) in self.of.iter().enumerate() {
             let bit = 1u64.checked_shl(u32::from(self.panels[k])).unwrap_or(0);
             match within(target, shadow) {
                 Within::None => {}
                 Within::All => return Sight { factors: [0.0, whole], hiding: u64::MAX },
                 Within::Part(part) => {
-                    let own = lambert(x, normal, &part);
-                    hidden_all += own - hidden(x, normal, &part, own, &self.of[..k]);
+                    if !are_many {
+                        let own = lambert(x, normal, &part);
+                        hidden_all += own - hidden(x, normal, &part, own, &self.of[..k]);
+                    }
                     hiding |= bit;
                 }
             }
+        }
+        if are_many {
+            hidden_all = whole - left(target, &self.of).iter().map(|piece| lambert(x, normal, piece)).sum::<f64>();
         }
         Sight { factors: [(whole - hidden_all).max(0.0), hidden_all], hiding }
     }
@@ -123,6 +133,34 @@ fn shadow(x: DVec3, panel: &Panel, touch: f64) -> Option<Shadow> {
         corner = next;
     }
     Some(planes)
+}
+
+/// What shadows leave of a polygon, as convex pieces.
+fn left(target: &[DVec3], shadows: &[Shadow]) -> Vec<Loop> {
+    let mut pieces: Vec<Loop> = vec![target.into()];
+    let mut next = Vec::new();
+    for shadow in shadows {
+        for mut piece in pieces.drain(..) {
+            match within(&piece, shadow) {
+                Within::None => next.push(piece),
+                Within::All => {}
+                // Plane by plane: what lies below one is left, what lies above all is hidden.
+                Within::Part(_) => {
+                    for &(normal, offset) in shadow {
+                        let mut below = piece.clone();
+                        if keep_above(&mut below, -normal, -offset) {
+                            next.push(below);
+                        }
+                        if !keep_above(&mut piece, normal, offset) {
+                            break;
+                        }
+                    }
+                }
+            }
+        }
+        std::mem::swap(&mut pieces, &mut next);
+    }
+    pieces
 }
 
 /// The form factor of what shadows hide of a polygon whose own is `whole`.
