@@ -72,7 +72,15 @@ fn describe(input: &Input) -> Value {
     let materials: Vec<Value> = scene
         .materials
         .iter()
-        .map(|m| json!({ "name": m.name, "base_color": m.base_color, "emissive": m.emissive, "double_sided": m.double_sided }))
+        .map(|m| {
+            let mut json = json!({
+                "name": m.name, "base_color": m.base_color, "emissive": m.emissive, "double_sided": m.double_sided
+            });
+            if let Some(transmission) = &m.transmission {
+                json["transmittance"] = json!(transmission.transmittance);
+            }
+            json
+        })
         .collect();
     let lights: Vec<Value> = scene
         .lights

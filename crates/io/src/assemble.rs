@@ -206,7 +206,7 @@ fn drop_doubled_faces(scene: &mut Scene, file: &str, faults: &mut Faults) {
         let (key, side) = if b < c { ([a, b, c], 0) } else { ([a, c, b], 1) };
         let twins = faces.entry(key).or_default();
 
-        let double_sided = |t: usize| scene.material(t).double_sided;
+        let double_sided = |t: usize| scene.material(t).has_two_sides();
         let mut drop = |t: usize| {
             dropped[t] = true;
             doubled[scene.triangle_object[t] as usize] += 1;

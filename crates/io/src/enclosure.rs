@@ -83,7 +83,7 @@ pub fn enclosure_of(scene: &Scene, grouping: Grouping, file: &str, faults: &mut 
             continue;
         };
         let material = scene.objects[object].material;
-        let back = scene.materials[material].double_sided.then(|| facet.flipped());
+        let back = scene.materials[material].has_two_sides().then(|| facet.flipped());
         for (facet, side) in std::iter::once((facet, "")).chain(back.map(|back| (back, " back"))) {
             let group = match grouping {
                 Grouping::Material => material,

@@ -6,6 +6,7 @@
 //! keeping the pilot where it looked even would keep its errors too.
 
 use radiosity_scene::{Bands, Elements, luminance};
+use radiosity_solve::{DiffuseResponse, SheetResponse};
 use radiosity_trace::Tracer;
 use radiosity_transport::{ElementReceivers, Exposure, Luminaires, Progress, Shadowing, Stopped};
 use rayon::prelude::*;
@@ -24,6 +25,8 @@ pub(crate) struct Optics {
     /// m².
     pub area: Vec<f64>,
     pub reflectance: Vec<Bands>,
+    /// What passes through, where anything does.
+    pub sheets: Sheets,
     /// Emitted exitance, lm/m² per band.
     pub exitance: Vec<Bands>,
 }
@@ -34,7 +37,68 @@ impl Optics {
         let area = ids.clone().into_par_iter().map(|e| elements.area(tracer.mesh, e)).collect();
         let (reflectance, exitance) =
             ids.into_par_iter().map(|e| elements.optics(tracer.scene, tracer.mesh, e)).unzip();
-        Optics { area, reflectance, exitance }
+        Optics { area, reflectance, sheets: Sheets::new(tracer, elements), exitance }
+    }
+}
+
+/// Diffuse transmission between the two sides of elements. Empty where no surface transmits light.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sheets {
+    /// The other side of each element, itself where nothing passes.
+    pub opposite: Vec<u32>,
+    /// τ of each element: of what arrives on its other side, the share that leaves it.
+    pub transmittance: Vec<Bands>,
+}
+
+impl Sheets {
+    /// Of elements that are divided alike on the two sides of a sheet, as [`divided`] makes them.
+    fn new(tracer: &Tracer, elements: &Elements) -> Sheets {
+        let (scene, mesh) = (tracer.scene, tracer.mesh);
+        if !scene.transmits() {
+            return Sheets::default();
+        }
+        let (opposite, transmittance) = (0..elements.len() as u32)
+            .into_par_iter()
+            .map(|e| {
+                let tau = elements.transmittance(scene, mesh, e);
+                match elements.opposite(e).filter(|_| tau.iter().any(|t| *t > 0.0)) {
+                    Some(opposite) => (opposite, tau),
+                    None => (e, [0.0; 3]),
+                }
+            })
+            .unzip();
+        Sheets { opposite, transmittance }
+    }
+
+    /// The same where elements are partly buried: what leaves an exposed place arrived at the same place of the other
+    /// side, if that is exposed too. Radiosity is the mean over the exposed places.
+    pub fn exposed(mut self, exposure: &Exposure) -> Sheets {
+        for (e, tau) in self.transmittance.iter_mut().enumerate() {
+            let (own, other) = (exposure.mask(e as u32), exposure.mask(self.opposite[e]));
+            if other != u64::MAX || own != u64::MAX {
+                let share = (own & other).count_ones() as f32 / own.count_ones().max(1) as f32;
+                *tau = tau.map(|t| t * share);
+            }
+        }
+        self
+    }
+
+    /// The element whose light comes through an element, and the share that does.
+    #[inline]
+    pub fn passed(&self, element: usize) -> Option<(usize, Bands)> {
+        let other = *self.opposite.get(element)? as usize;
+        (other != element).then(|| (other, self.transmittance[element]))
+    }
+
+    /// R with this transmission.
+    pub fn response(&self, diffuse: DiffuseResponse) -> SheetResponse {
+        let transmittance = self.transmittance.iter().flatten().map(|t| f64::from(*t)).collect();
+        SheetResponse { diffuse, opposite: self.opposite.clone(), transmittance }
+    }
+
+    /// Whether nothing passes anywhere.
+    pub fn is_empty(&self) -> bool {
+        self.opposite.is_empty()
     }
 }
 
@@ -48,7 +112,7 @@ pub(crate) fn divided(
     variation: f64,
     progress: &impl Progress,
 ) -> Result<Elements, Stopped> {
-    let Optics { area, reflectance, exitance } = Optics::new(tracer, &cells);
+    let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &cells);
     let luminaires = Luminaires::new(tracer.scene, tracer.mesh, &cells, &area, &exitance);
     // Nothing is known yet of what is buried; such places drop out one by one.
     let exposure = Exposure::default();
@@ -56,7 +120,9 @@ pub(crate) fn divided(
     let looking = Shadowing { places: PLACES, rays: luminaires.lights.len().min(RAYS) as u32 };
     let direct = luminaires.variation(tracer, &receivers, &looking, progress)?;
 
-    let weight = |i: usize| area[i] * f64::from(luminance(reflectance[i]));
+    // Light that goes astray on a sheet does so on both sides.
+    let passing = |i: usize| sheets.passed(i).map_or(0.0, |(other, _)| luminance(sheets.transmittance[other]));
+    let weight = |i: usize| area[i] * f64::from(luminance(reflectance[i]) + passing(i));
     let flux: f64 = (0..cells.len()).map(|i| weight(i) * f64::from(direct[i].mean)).sum();
     let astray: Vec<f64> = (0..cells.len()).map(|i| weight(i) * f64::from(direct[i].variance).sqrt()).collect();
     let mut order: Vec<usize> = (0..cells.len()).filter(|&i| astray[i] > 0.0).collect();
@@ -68,7 +134,11 @@ pub(crate) fn divided(
             break;
         }
         left -= astray[i];
-        pieces[cells.cell(i as u32)] = PIECES;
+        let cell = cells.cell(i as u32);
+        pieces[cell] = PIECES;
+        if let (Some(_), Some(opposite)) = (sheets.passed(i), cells.opposite_cell(cell)) {
+            pieces[opposite] = PIECES;
+        }
     }
     Ok(cells.refined(&pieces))
 }

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::monitor::Monitor;
 use radiosity_scene::{Elements, Enclosure, Mesh};
 use radiosity_solve::{
-    DiffuseResponse, Go, Info, Params, SolveError, Solver, SparseTransport, Transport, solve as solve_stored,
+    Go, Info, Params, SheetResponse, SolveError, Solver, SparseTransport, Transport, solve as solve_stored,
     solve_operator,
 };
 use radiosity_transport::view_factors::ViewFactorOptions;
@@ -99,14 +99,14 @@ const RANDOM_TOLERANCE: f64 = 5e-3;
 /// Solves X = E + R F X in place, by the matrix if there is one.
 pub(crate) fn solve(
     (table, matrix): (&HitTable, Option<&Matrix>),
-    response: &DiffuseResponse,
+    response: &SheetResponse,
     (e, x): (&[f64], &mut [f64]),
     (solver, params): (Solver, &Params),
     monitor: &dyn Monitor,
 ) -> Result<Info, Error> {
     let least = if solver.is_random() { RANDOM_TOLERANCE } else { 0.0 };
     let params = &Params { tolerance: params.tolerance.max(least), ..*params };
-    let mut way = Way::new(solver.is_random(), params.tolerance, &response.reflectance);
+    let mut way = Way::new(solver.is_random(), params.tolerance, &response.diffuse.reflectance);
     let step = |_: &[f64], info: &Info| {
         let go = monitor.step(way.done(info), PARTS);
         if go { Go::On } else { Go::Stop }

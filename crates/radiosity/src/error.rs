@@ -68,6 +68,12 @@ pub enum Error {
         /// The method's name.
         method: &'static str,
     },
+    /// The solver needs an equation that is symmetric, and sheets that transmit light make it another.
+    #[error("{solver} cannot solve for surfaces that transmit light (use gmres, gauss-seidel, lu or the default)")]
+    Transmission {
+        /// The solver.
+        solver: radiosity_solve::Solver,
+    },
     /// An element is no polygon that form factors can be asked of.
     #[error("{0}")]
     Element(radiosity_scene::ElementError),

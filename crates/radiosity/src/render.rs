@@ -74,7 +74,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
     for (seen, e) in view.seen.iter().zip(&answer.irradiance) {
         let (pixel, response) = (seen.pixel as usize, luminance(seen.response));
-        if response > share[pixel] {
+        if response > share[pixel] && !seen.behind {
             (share[pixel], illuminance[pixel]) = (response, luminance(*e));
         }
     }

@@ -4,7 +4,7 @@
 //! X = (E − P) + R (D + S + F X), with D the direct irradiance and S the sky's, both known before the solve.
 
 use crate::Error;
-use crate::division::{Optics, divided};
+use crate::division::{Optics, Sheets, divided};
 use crate::equation::{self, Matrix};
 use crate::monitor::{Monitor, Stages, Watch};
 use radiosity_scene::{Bands, Elements, SkyPatches};
@@ -131,6 +131,8 @@ pub struct Solution<'a> {
     pub area: Vec<f64>,
     /// Reflectance of each element.
     pub reflectance: Vec<Bands>,
+    /// What passes through sheets.
+    sheets: Sheets,
     /// Emitted exitance of each element, lm/m² per band.
     pub exitance: Vec<Bands>,
     /// Residual, bound and steps of the last solve.
@@ -178,6 +180,9 @@ impl<'a> Solution<'a> {
         options.suit_method();
         let options = &options;
         options.refuse_unfit_solver()?;
+        if scene.transmits() && !options.solver.takes_sheets() {
+            return Err(Error::Transmission { solver: options.solver });
+        }
         let stages = Stages::default();
         let element_size = element_size(tracer, options);
         options.refuse_large_matrices(Elements::count(scene, mesh, element_size))?;
@@ -190,8 +195,9 @@ impl<'a> Solution<'a> {
             divided(tracer, Elements::new(scene, mesh, element_size), options.variation, &watch)
         })?;
         options.refuse_large_matrices(elements.len())?;
-        let Optics { area, reflectance, exitance } = Optics::new(tracer, &elements);
+        let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
         let exposure = stages.time(monitor, "exposure", || Exposure::new(tracer, mesh, &elements, &watch))?;
+        let sheets = sheets.exposed(&exposure);
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
         let needed = needed + elements.len() * luminaires.lights.len() * size_of::<Bands>();
         if needed > options.memory {
@@ -218,6 +224,7 @@ impl<'a> Solution<'a> {
             columns,
             area,
             reflectance,
+            sheets,
             exitance,
             info: Info::default(),
             stages,
@@ -239,14 +246,22 @@ impl<'a> Solution<'a> {
         let (weight, direct) = (self.exposed_area(), self.direct());
         let own = |i: usize, band: usize| {
             let seen = f64::from(self.columns.seen(i)[band]);
-            f64::from(self.exitance[i][band] - self.luminaires.promoted[i][band])
-                + f64::from(self.reflectance[i][band]) * seen
+            let own = f64::from(self.exitance[i][band] - self.luminaires.promoted[i][band])
+                + f64::from(self.reflectance[i][band]) * seen;
+            // What a sheet receives is spread over all that it gives; openness to one side says nothing of the other.
+            match self.sheets.passed(i) {
+                Some((other, tau)) => own + f64::from(tau[band]) * f64::from(direct[other][band]),
+                None => own,
+            }
         };
         let ambient: Bands = std::array::from_fn(|band| {
             let (mut given, mut kept) = (0.0, 0.0);
             for (i, w) in weight.iter().enumerate() {
                 given += w * own(i, band);
                 kept += w * (1.0 - f64::from(self.reflectance[i][band]));
+                if let Some((_, tau)) = self.sheets.passed(i) {
+                    kept -= w * f64::from(tau[band]);
+                }
             }
             if kept > 0.0 { (given / kept) as f32 } else { 0.0 }
         });
@@ -254,6 +269,9 @@ impl<'a> Solution<'a> {
         for i in 0..weight.len() {
             for band in 0..3 {
                 self.values[i][band] = own[i][band] as f32 + self.reflectance[i][band] * ambient[band];
+                if let Some((_, tau)) = self.sheets.passed(i) {
+                    self.values[i][band] += tau[band] * ambient[band];
+                }
                 self.indirect[i][band] = ambient[band];
                 self.irradiance[i][band] = direct[i][band] + ambient[band];
             }
@@ -330,12 +348,19 @@ impl<'a> Solution<'a> {
                 let own = f64::from(self.exitance[i][band] - self.luminaires.promoted[i][band]);
                 let arriving = f64::from(seen[band]) + f64::from(daylight[i][band]);
                 e[3 * i + band] = own + f64::from(self.reflectance[i][band]) * arriving;
+                if let Some((other, tau)) = self.sheets.passed(i) {
+                    let behind = f64::from(direct[other][band]) + f64::from(daylight[other][band]);
+                    e[3 * i + band] += f64::from(tau[band]) * behind;
+                }
             }
         }
         let reflectance = self.reflectance.iter().flatten().map(|r| f64::from(*r)).collect();
         let reciprocal = self.matrix.as_ref().is_some_and(|matrix| matrix.is_reciprocal);
-        let response =
-            DiffuseResponse { reflectance, bands: 3, reciprocal_area: reciprocal.then(|| self.area.clone()) };
+        let response = self.sheets.response(DiffuseResponse {
+            reflectance,
+            bands: 3,
+            reciprocal_area: reciprocal.then(|| self.area.clone()),
+        });
         let mut x: Vec<f64> = if self.info.steps > 0 {
             self.values[..n].iter().flat_map(|v| v[..3].iter().map(|v| f64::from(*v))).collect()
         } else {
@@ -409,12 +434,20 @@ impl<'a> Solution<'a> {
         self.table.daylight().iter().zip(self.gathered_halves()).map(both).collect()
     }
 
-    /// Radiosity B = E + ρ H of each element, lm/m² per band.
+    /// Transmittance of each element, nothing where no light passes: of what arrives on its other side, the share that
+    /// leaves it.
+    pub fn transmittance(&self, element: usize) -> Bands {
+        self.sheets.passed(element).map_or([0.0; 3], |(_, tau)| tau)
+    }
+
+    /// Radiosity B = E + ρ H of each element, lm/m² per band, and + τ H of its other side on sheets.
     pub fn radiosity(&self) -> Vec<Bands> {
         (0..self.elements.len())
             .map(|i| {
+                let passed = self.sheets.passed(i);
                 std::array::from_fn(|band| {
-                    self.exitance[i][band] + self.reflectance[i][band] * self.irradiance[i][band]
+                    let own = self.exitance[i][band] + self.reflectance[i][band] * self.irradiance[i][band];
+                    passed.map_or(own, |(other, tau)| own + tau[band] * self.irradiance[other][band])
                 })
             })
             .collect()
@@ -488,6 +521,10 @@ impl<'a> Solution<'a> {
                 sums[0][band] += weight[i] * f64::from(self.exitance[i][band]);
                 sums[2][band] += weight[i] * f64::from(from_sky[i][band]);
                 sums[3][band] += weight[i] * (1.0 - rho) * e;
+                if let Some((other, tau)) = self.sheets.passed(i) {
+                    // Not absorbed on the other side: it leaves this one.
+                    sums[3][band] -= weight[i] * f64::from(tau[band]) * f64::from(self.irradiance[other][band]);
+                }
                 sums[4][band] += weight[i] * b * shares[i][0];
                 sums[5][band] += weight[i] * b * shares[i][1];
             }

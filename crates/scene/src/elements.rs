@@ -46,8 +46,8 @@ impl Elements {
                 base
             };
             let front = run();
-            let double_sided = scene.material(mesh.source[t] as usize).double_sided;
-            let back = if double_sided { run() } else { NO_CELL };
+            let two_sides = scene.material(mesh.source[t] as usize).has_two_sides();
+            let back = if two_sides { run() } else { NO_CELL };
             elements.division.push(division);
             elements.base.push([front, back]);
         }
@@ -73,7 +73,7 @@ impl Elements {
 
     /// How many elements a size would give, without making them.
     pub fn count(scene: &Scene, mesh: &Mesh, size: f64) -> usize {
-        let sides = |t: usize| 1 + usize::from(scene.material(mesh.source[t] as usize).double_sided);
+        let sides = |t: usize| 1 + usize::from(scene.material(mesh.source[t] as usize).has_two_sides());
         (0..mesh.triangles.len()).map(|t| (division(mesh, t, size) as usize).pow(2) * sides(t)).sum()
     }
 
@@ -179,6 +179,24 @@ impl Elements {
         mesh.area(t) / (k * k * f64::from(self.pieces(element)))
     }
 
+    /// The cell at the same place on the other side of the triangle, if that has elements.
+    pub fn opposite_cell(&self, cell: usize) -> Option<usize> {
+        let [front, back] = self.base[self.triangle[cell] as usize];
+        let cell = cell as u32;
+        match back {
+            NO_CELL => None,
+            _ if cell >= back => Some((cell - back + front) as usize),
+            _ => Some((cell - front + back) as usize),
+        }
+    }
+
+    /// The element at the same place on the other side, if there is one and both sides are divided alike.
+    pub fn opposite(&self, element: ElementId) -> Option<ElementId> {
+        let cell = self.cell(element);
+        let (own, other) = (self.of_cell(cell), self.of_cell(self.opposite_cell(cell)?));
+        (own.len() == other.len()).then_some(other.start + (element - own.start))
+    }
+
     /// Unit normal on an element's own side.
     pub fn normal(&self, mesh: &Mesh, element: ElementId) -> DVec3 {
         match self.place(element) {
@@ -216,6 +234,25 @@ impl Elements {
         }
     }
 
+    /// Mean transmittance of what of an element stops a ray, as [`Elements::optics`] has its reflectance: of the light
+    /// that falls on its other side, the share that leaves it.
+    pub fn transmittance(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> Bands {
+        let (mut transmittance, mut opaque) = ([0.0; 3], 0.0);
+        if scene.material(mesh.source[self.place(element).0] as usize).transmission.is_none() {
+            return transmittance;
+        }
+        self.sample_optics(scene, mesh, element, |at, share| {
+            let weight = share * scene.opacity(at);
+            if weight > 0.0 {
+                opaque += weight;
+                for (sum, t) in transmittance.iter_mut().zip(scene.transmittance(at)) {
+                    *sum += weight * t;
+                }
+            }
+        });
+        if opaque > 0.0 { transmittance.map(|t| t / opaque) } else { transmittance }
+    }
+
     /// Mean opacity of an element. An area emits its exitance times this.
     pub fn opacity(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> f32 {
         let (t, _) = self.place(element);
@@ -234,6 +271,7 @@ impl Elements {
         let varied = material.base_color_texture.is_some()
             || material.metallic_texture.is_some()
             || material.emissive_texture.is_some()
+            || material.transmission.as_ref().is_some_and(|t| t.texture.is_some() || t.share_texture.is_some())
             || !scene.colors.is_empty();
         let n = if varied { 4 } else { 1 };
         for i in 0..n * n {

@@ -44,7 +44,25 @@ pub enum AlphaMode {
     Blend,
 }
 
-/// A diffuse material: reflectance and emission per band.
+/// What a thin sheet passes on: light that falls on one side leaves the other, diffusely.
+///
+/// With s = 1 where there is no picture of the share, else its alpha, the sheet has at each point
+/// ρ = (1 − `replaced` s) base colour and τ = s `transmittance` × its picture, both times 1 − metallic. Both sides are
+/// alike: a diffuse sheet passes the same share in either direction (Helmholtz reciprocity).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Transmission {
+    /// Transmittance τ per band.
+    pub transmittance: Bands,
+    /// Picture (sRGB) that multiplies it.
+    pub texture: Option<TextureRef>,
+    /// Share of the base colour that transmission takes the place of, 0..1: glTF's `diffuseTransmissionFactor`. At 0
+    /// the base colour is the reflectance itself.
+    pub replaced: f32,
+    /// Picture whose alpha says how much of the sheet transmits.
+    pub share_texture: Option<TextureRef>,
+}
+
+/// A diffuse material: reflectance, transmittance and emission per band.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name given by the author; may be empty.
@@ -63,8 +81,11 @@ pub struct Material {
     pub emissive_texture: Option<TextureRef>,
     /// Meaning of alpha.
     pub alpha_mode: AlphaMode,
-    /// Whether the back of the surface reflects and emits as the front does.
+    /// Whether the back of the surface reflects and emits as the front does. That of a sheet that transmits light does
+    /// in any case: ask [`Material::has_two_sides`].
     pub double_sided: bool,
+    /// Diffuse transmission; `None` for what lets no light through.
+    pub transmission: Option<Transmission>,
 }
 
 impl Default for Material {
@@ -79,6 +100,7 @@ impl Default for Material {
             emissive_texture: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
+            transmission: None,
         }
     }
 }
@@ -87,5 +109,28 @@ impl Material {
     /// Whether the surface gives light anywhere.
     pub fn emits(&self) -> bool {
         self.emissive.iter().any(|&e| e > 0.0)
+    }
+
+    /// Whether light passes through the surface anywhere.
+    pub fn transmits(&self) -> bool {
+        self.transmission.as_ref().is_some_and(|t| t.transmittance.iter().any(|&tau| tau > 0.0))
+    }
+
+    /// Whether the back takes part in the exchange of light as the front does. Light that leaves a sheet on its other
+    /// side needs that side.
+    pub fn has_two_sides(&self) -> bool {
+        self.double_sided || self.transmission.is_some()
+    }
+
+    /// The largest ρ + τ of each band, whatever pictures and vertex colours make of it (they only take away): linear in
+    /// the share that transmits, so that it is found where that is nothing or all. `None` where nothing is transmitted.
+    pub fn most_returned(&self) -> Option<Bands> {
+        let transmission = self.transmission.as_ref()?;
+        let diffuse = if self.metallic_texture.is_some() { 1.0 } else { 1.0 - self.metallic };
+        Some(std::array::from_fn(|band| {
+            let (base, tau) = (self.base_color[band], transmission.transmittance[band]);
+            let all = base * (1.0 - transmission.replaced) + tau;
+            diffuse * if transmission.share_texture.is_some() { base.max(all) } else { all }
+        }))
     }
 }

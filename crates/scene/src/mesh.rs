@@ -46,6 +46,16 @@ pub enum Side {
     Back,
 }
 
+impl Side {
+    /// The opposite side.
+    pub fn other(self) -> Side {
+        match self {
+            Side::Front => Side::Back,
+            Side::Back => Side::Front,
+        }
+    }
+}
+
 /// The scene's triangles, sewn together. Rays, elements and outputs all refer to these triangles.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
@@ -327,7 +337,7 @@ impl Mesh {
         };
         let around: Vec<(usize, f64)> = around.map(|(r, k)| (r, angle(r, k))).collect();
         let to_neighbour = around.iter().find(|(r, _)| *r == s).map_or(std::f64::consts::PI, |(_, angle)| *angle);
-        let double_sided = |r: usize| scene.material(self.source[r] as usize).double_sided;
+        let double_sided = |r: usize| scene.material(self.source[r] as usize).has_two_sides();
         let both_sides = double_sided(t) && double_sided(s);
         around.iter().filter(|(r, _)| *r != t && *r != s).any(|(_, angle)| {
             let in_front = *angle > STANDING && *angle < to_neighbour - STANDING;

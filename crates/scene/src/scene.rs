@@ -69,6 +69,9 @@ pub struct Scene {
     pub sky: Sky,
 }
 
+/// By how much ρ + τ may be above one: the rounding of three numbers that are one together.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
+
 /// Which axis points to the zenith.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Up {
@@ -168,16 +171,63 @@ impl Scene {
         self.sky = sky;
     }
 
-    /// Diffuse reflectance per band at a point, at most [`MAX_REFLECTANCE`].
+    /// Diffuse reflectance ρ per band at a point, at most [`MAX_REFLECTANCE`].
     pub fn reflectance(&self, at: Surface) -> Bands {
+        match self.material(at.triangle).transmission {
+            None => self.plain_reflectance(at),
+            Some(_) => self.returned(at)[0],
+        }
+    }
+
+    /// Diffuse transmittance τ per band at a point: of the light that falls on one side, the share that leaves the other
+    /// diffusely. ρ + τ is at most [`MAX_REFLECTANCE`].
+    pub fn transmittance(&self, at: Surface) -> Bands {
+        match self.material(at.triangle).transmission {
+            None => [0.0; 3],
+            Some(_) => self.returned(at)[1],
+        }
+    }
+
+    /// Whether any surface transmits light.
+    pub fn transmits(&self) -> bool {
+        self.objects.iter().any(|object| self.materials[object.material].transmits())
+    }
+
+    /// ρ and τ of a point of a sheet, together at most [`MAX_REFLECTANCE`]: what is too much is taken from both alike.
+    fn returned(&self, at: Surface) -> [Bands; 2] {
+        let material = self.material(at.triangle);
+        let Some(transmission) = &material.transmission else { return [self.plain_reflectance(at), [0.0; 3]] };
+        let share = transmission.share_texture.as_ref().map_or(1.0, |texture| self.look_up(texture, at, false)[3]);
+        let tint = transmission.texture.as_ref().map_or([1.0; 4], |texture| self.look_up(texture, at, true));
+        let (base, diffuse) = (self.base_color(material, at), self.diffuse_share(material, at));
+        let mut both = [[0.0; 3]; 2];
+        for band in 0..3 {
+            let rho = (base[band] * diffuse * (1.0 - transmission.replaced * share)).max(0.0);
+            let tau = (transmission.transmittance[band] * tint[band] * diffuse * share).max(0.0);
+            let scale = MAX_REFLECTANCE / (rho + tau);
+            (both[0][band], both[1][band]) = match tau {
+                0.0 => (rho.min(MAX_REFLECTANCE), 0.0),
+                _ if scale < 1.0 => (rho * scale, tau * scale),
+                _ => (rho, tau),
+            };
+        }
+        both
+    }
+
+    fn plain_reflectance(&self, at: Surface) -> Bands {
         let material = self.material(at.triangle);
         let base = self.base_color(material, at);
+        let diffuse = self.diffuse_share(material, at);
+        std::array::from_fn(|band| (base[band] * diffuse).clamp(0.0, MAX_REFLECTANCE))
+    }
+
+    /// What is no metal.
+    fn diffuse_share(&self, material: &Material, at: Surface) -> f32 {
         let metallic = match &material.metallic_texture {
             Some(texture) => material.metallic * self.look_up(texture, at, false)[2],
             None => material.metallic,
         };
-        let diffuse = 1.0 - metallic.clamp(0.0, 1.0);
-        std::array::from_fn(|band| (base[band] * diffuse).clamp(0.0, MAX_REFLECTANCE))
+        1.0 - metallic.clamp(0.0, 1.0)
     }
 
     /// Luminance per band that a ray finds which the surface stops at a point, cd/m². Light that is asked of the
@@ -287,6 +337,19 @@ impl Scene {
             }
             if material.emissive.iter().any(|e| !e.is_finite() || *e < 0.0) {
                 faults.error(&place, format!("emission {:?}", material.emissive), "use finite values, 0 or more");
+            }
+            if let Some(transmission) = &material.transmission {
+                let tau = transmission.transmittance;
+                if tau.iter().any(|t| !(0.0..=1.0).contains(t)) || !(0.0..=1.0).contains(&transmission.replaced) {
+                    let what = format!("transmittance {tau:?}, which replaces {} of the reflectance", transmission.replaced);
+                    faults.error(&place, what, "use values in 0..1");
+                }
+            }
+            // A share of the light is absorbed, α = 1 − ρ − τ, and none is made.
+            let returned = material.most_returned().unwrap_or_default();
+            if returned.iter().any(|sum| *sum > 1.0 + ROUNDING) {
+                let what = format!("reflectance and transmittance sum to {returned:?}");
+                faults.error(&place, what, "no surface gives back more light than it gets: make one of them smaller");
             }
         }
         if self.triangles.is_empty() {

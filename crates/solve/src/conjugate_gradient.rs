@@ -22,7 +22,7 @@ pub fn conjugate_gradient<T: Transport>(
 ) -> Result<Info, SolveError> {
     let Some(weight) = response.self_adjoint_weight() else {
         return Err(SolveError::NotApplicable(
-            "conjugate gradients need a reciprocal transport and a diagonal response; use Jacobi",
+            "conjugate gradients need a reciprocal transport and a response without transmission; use gmres",
         ));
     };
     let bands = response.bands();

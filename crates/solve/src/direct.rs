@@ -15,7 +15,7 @@ use faer::{Mat, Side};
 /// LU factors with partial pivoting; `b` receives the result.
 ///
 /// # Errors
-/// [`SolveError::NotApplicable`] if the response is not diagonal; otherwise as [`crate::jacobi`].
+/// [`SolveError::NotApplicable`] if the response is not one of sheets; otherwise as [`crate::jacobi`].
 pub fn lu<T: Rows>(
     transport: &T,
     response: &(impl Response + ?Sized),
@@ -24,14 +24,18 @@ pub fn lu<T: Rows>(
     params: &Params,
     step: impl FnMut(&[f64], &Info) -> Go,
 ) -> Result<Info, SolveError> {
-    let Some(rho) = response.diagonal() else {
-        return Err(SolveError::NotApplicable("elimination needs a diagonal response; use bicgstab"));
+    let Some(sheets) = response.sheets() else {
+        return Err(SolveError::NotApplicable("elimination needs a response of plain surfaces and sheets; use bicgstab"));
     };
+    let rho = sheets.reflectance;
     let (bands, n) = (response.bands(), transport.space().dim());
     for band in 0..bands {
         let mut matrix = Mat::<f64>::identity(n, n);
         for i in 0..n {
             transport.row(i, |j, factor| matrix[(i, j)] -= rho[i * bands + band] * factor);
+            if let Some((other, tau)) = sheets.passed(i, bands) {
+                transport.row(other, |j, factor| matrix[(i, j)] -= tau[band] * factor);
+            }
         }
         let mut x = Mat::from_fn(n, 1, |i, _| e[i * bands + band]);
         matrix.partial_piv_lu().solve_in_place(&mut x);
@@ -57,7 +61,7 @@ pub fn cholesky<T: Rows>(
 ) -> Result<Info, SolveError> {
     let (Some(rho), Some(weight)) = (response.diagonal(), response.self_adjoint_weight()) else {
         return Err(SolveError::NotApplicable(
-            "Cholesky factors need a reciprocal transport and a diagonal response; use lu",
+            "Cholesky factors need a reciprocal transport and a response without transmission; use lu",
         ));
     };
     let (bands, n) = (response.bands(), transport.space().dim());

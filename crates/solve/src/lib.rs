@@ -51,7 +51,7 @@ pub use southwell::southwell;
 pub use sparse::SparseTransport;
 pub use stochastic_jacobi::stochastic_jacobi;
 pub use substructure::Substructure;
-pub use traits::{AreaSpace, DiffuseResponse, Response, Rows, Shoot, Space, Transport};
+pub use traits::{AreaSpace, DiffuseResponse, Response, Rows, SheetResponse, Sheets, Shoot, Space, Transport};
 
 use serde::Serialize;
 
@@ -131,6 +131,21 @@ pub enum SolveError {
         band: usize,
         /// What was given.
         value: f64,
+    },
+    /// A transmittance that with its reflectance gives back more light than arrives, or none at all.
+    #[error(
+        "reflectance {reflectance} and transmittance {transmittance} of unknown {unknown}, band {band}, are not both 0 or \
+         more and at most 1 together"
+    )]
+    Transmittance {
+        /// The unknown.
+        unknown: usize,
+        /// The band.
+        band: usize,
+        /// Its reflectance.
+        reflectance: f64,
+        /// What it passes on from its other side.
+        transmittance: f64,
     },
     /// No solver has this name.
     #[error("no solver is called \"{0}\"; there are {known}", known = Solver::names())]

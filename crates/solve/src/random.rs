@@ -4,7 +4,7 @@
 //! nowhere with 1 − Σ_j F_ij.
 
 use crate::gauge::{Gauge, begin, is_done, remainder};
-use crate::{Go, Info, Params, Response, Rows, SolveError, Space};
+use crate::{Go, Info, Params, Response, Rows, Sheets, SolveError, Space};
 
 /// SplitMix64 (Steele, Lea & Flood 2014): small, seeded, the same on every machine.
 pub(crate) struct Random(u64);
@@ -73,8 +73,8 @@ impl Destinations {
 /// What a run works on.
 pub(crate) struct Walks<'a> {
     pub destinations: Destinations,
-    /// The reflectances, bands interleaved.
-    pub rho: &'a [f64],
+    /// Reflectances and transmittances.
+    pub sheets: Sheets<'a>,
     pub bands: usize,
     /// Area of each unknown, or whatever weighs it in its space.
     pub area: Vec<f64>,
@@ -83,6 +83,12 @@ pub(crate) struct Walks<'a> {
 }
 
 impl Walks<'_> {
+    /// Where light that lands on an unknown comes out on the other side, and τ by band there.
+    pub fn through(&self, landed: usize) -> Option<(usize, &[f64])> {
+        let (other, _) = self.sheets.passed(landed, self.bands)?;
+        Some((other, self.sheets.passed(other, self.bands)?.1))
+    }
+
     /// The power of each unknown: area times |unshot|, summed over the bands; and the sum of all.
     pub fn power(&self, unshot: &[f64]) -> (Vec<f64>, f64) {
         let of = |(area, x): (&f64, &[f64])| area * x.iter().map(|x| x.abs()).sum::<f64>();
@@ -118,10 +124,12 @@ pub(crate) fn repeat<T: Rows>(
     mut step: impl FnMut(&[f64], &Info) -> Go,
     run: impl Fn(&Walks, &[f64], &mut Random, &mut [f64]) -> u64,
 ) -> Result<Info, SolveError> {
-    let (Some(rho), Some(_)) = (response.diagonal(), response.self_adjoint_weight()) else {
-        return Err(SolveError::NotApplicable("random methods need a reciprocal transport and a diagonal response"));
+    let (Some(sheets), true) = (response.sheets(), response.is_reciprocal()) else {
+        return Err(SolveError::NotApplicable(
+            "random methods need a reciprocal transport and a response of plain surfaces and sheets",
+        ));
     };
-    if rho.iter().any(|rho| *rho >= 1.0) {
+    if response.largest().iter().any(|most| *most >= 1.0) {
         return Err(SolveError::NotApplicable("random walks never end where a reflectance is one or more"));
     }
     let (bands, unknowns) = (response.bands(), transport.space().dim());
@@ -129,7 +137,7 @@ pub(crate) fn repeat<T: Rows>(
     transport.space().accumulate(&vec![1.0; unknowns], 1, |i, weight| area[i] = weight);
     let destinations = Destinations::new(transport)?;
     let samples = params.samples.max(1) as f64 * unknowns as f64;
-    let walks = Walks { destinations, rho, bands, area, samples };
+    let walks = Walks { destinations, sheets, bands, area, samples };
 
     let gauge = Gauge::new(transport, response, e);
     let start = b.to_vec();

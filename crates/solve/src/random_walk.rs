@@ -3,7 +3,8 @@
 //!
 //! A walk starts at i with a probability in proportion to its power A_i E_i, and goes on to j with probability F_ij.
 //! It scores at each landing what is reflected there (the collision estimator): B_j += ρ_j Φ/A_j for a power Φ, by
-//! band. Then it survives with the largest ρ_j of the bands, Φ being weighed so that the expectation stays. Unbiased;
+//! band. Then it survives with the largest ρ_j of the bands, Φ being weighed so that the expectation stays. On a sheet it
+//! scores on both sides, B_o += τ_o Φ/A_o, survives with the largest ρ_j + τ_o, and goes on from one of the two. Unbiased;
 //! the variance falls as one over the number of walks. It needs a reciprocal F. It is poor on small unknowns, which
 //! few walks meet, and never reaches a small residual: a thousandth takes a million walks or more.
 
@@ -45,7 +46,27 @@ fn run(walks: &Walks, r: &[f64], random: &mut Random, found: &mut [f64]) -> u64 
             loop {
                 draws += 1;
                 let Some((j, times)) = walks.destinations.draw(i, random) else { break };
-                let rho = &walks.rho[j * bands..(j + 1) * bands];
+                let rho = &walks.sheets.reflectance[j * bands..(j + 1) * bands];
+                if let Some((other, tau)) = walks.through(j) {
+                    for band in 0..bands {
+                        carried[band] *= times;
+                        found[j * bands + band] += rho[band] * carried[band] / walks.area[j];
+                        found[other * bands + band] += tau[band] * carried[band] / walks.area[other];
+                    }
+                    let most = |of: &[f64]| of.iter().fold(0f64, |m, x| m.max(*x));
+                    let survival = rho.iter().zip(tau).fold(0f64, |m, (rho, tau)| m.max(rho + tau));
+                    if random.unit() >= survival {
+                        break;
+                    }
+                    let passing = most(tau) / (most(rho) + most(tau));
+                    let passes = random.unit() < passing;
+                    let (kept, share) = if passes { (tau, passing) } else { (rho, 1.0 - passing) };
+                    for band in 0..bands {
+                        carried[band] *= kept[band] / (survival * share);
+                    }
+                    i = if passes { other } else { j };
+                    continue;
+                }
                 for band in 0..bands {
                     carried[band] *= times * rho[band];
                     found[j * bands + band] += carried[band] / walks.area[j];

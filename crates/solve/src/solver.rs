@@ -173,6 +173,12 @@ impl Solver {
         matches!(self, Solver::Cg | Solver::Cholesky | Solver::RandomWalk | Solver::StochasticJacobi)
     }
 
+    /// Whether it solves for sheets that pass light from one side to the other: I − R F is not symmetric in any positive
+    /// weight then.
+    pub fn takes_sheets(self) -> bool {
+        !matches!(self, Solver::Cg | Solver::Cholesky)
+    }
+
     /// Whether it eliminates: in a full matrix, whatever is zero in F.
     pub fn is_direct(self) -> bool {
         matches!(self, Solver::Lu | Solver::Cholesky)
@@ -228,13 +234,42 @@ fn check<T: Transport>(
     if !e.iter().chain(b).all(|x| x.is_finite()) {
         return Err(SolveError::NotApplicable("emission and the start must be finite numbers"));
     }
-    if let Some(rho) = response.diagonal() {
+    if let Some(sheets) = response.sheets() {
+        let rho = sheets.reflectance;
         if rho.len() != e.len() {
             return Err(SolveError::NotApplicable("a response needs one reflectance for each unknown and band"));
         }
         if let Some(k) = rho.iter().position(|rho| !(0.0..=1.0).contains(rho)) {
             return Err(SolveError::Reflectance { unknown: k / bands, band: k % bands, value: rho[k] });
         }
+        check_sheets(sheets, e.len(), bands)?;
     }
     Ok(())
+}
+
+/// By how much ρ + τ may be above one: what sums of a few numbers in single precision leave.
+const ROUNDING: f64 = 1e-6;
+
+/// Refuses sheets whose sides do not name each other, or that give back more light than they get (catalogue 12).
+fn check_sheets(sheets: Sheets<'_>, entries: usize, bands: usize) -> Result<(), SolveError> {
+    let (rho, tau, opposite) = (sheets.reflectance, sheets.transmittance, sheets.opposite);
+    if opposite.is_empty() && tau.is_empty() {
+        return Ok(());
+    }
+    if tau.len() != entries || opposite.len() * bands != entries {
+        return Err(SolveError::NotApplicable("sheets need an other side and a transmittance by band for each unknown"));
+    }
+    let is_pair = |(i, other): (usize, &u32)| opposite.get(*other as usize).is_some_and(|back| *back as usize == i);
+    if !opposite.iter().enumerate().all(is_pair) {
+        return Err(SolveError::NotApplicable("the two sides of a sheet must name each other"));
+    }
+    match (0..entries).find(|&k| !(0.0..=1.0).contains(&tau[k]) || rho[k] + tau[k] > 1.0 + ROUNDING) {
+        None => Ok(()),
+        Some(k) => Err(SolveError::Transmittance {
+            unknown: k / bands,
+            band: k % bands,
+            reflectance: rho[k],
+            transmittance: tau[k],
+        }),
+    }
 }

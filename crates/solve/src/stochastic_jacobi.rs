@@ -57,7 +57,10 @@ fn run(walks: &Walks, r: &[f64], random: &mut Random, found: &mut [f64]) -> u64 
                 let Some((j, times)) = walks.destinations.draw(i, random) else { continue };
                 for band in 0..bands {
                     let landed = walks.area[i] * unshot[i * bands + band] * share * times;
-                    next[j * bands + band] += walks.rho[j * bands + band] * landed / walks.area[j];
+                    next[j * bands + band] += walks.sheets.reflectance[j * bands + band] * landed / walks.area[j];
+                    if let Some((other, tau)) = walks.through(j) {
+                        next[other * bands + band] += tau[band] * landed / walks.area[other];
+                    }
                 }
             }
         }

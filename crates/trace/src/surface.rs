@@ -96,7 +96,7 @@ impl<'a> Tracer<'a> {
                             || material.base_color_texture.is_some_and(|t| !scene.textures[t.texture].is_opaque())
                     }
                 };
-                Kind { double_sided: material.double_sided, see_through }
+                Kind { double_sided: material.has_two_sides(), see_through }
             })
             .collect();
         Tracer {

@@ -124,24 +124,38 @@ impl Gather<'_> {
             let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
             let at = mesh.surface(triangle, uv);
             let sign = if side == Side::Front { 1.0 } else { -1.0 };
-            let spot = Place {
+            let mut spot = Place {
                 point: mesh.point(triangle, uv),
                 normal: sign * mesh.normal(triangle),
                 triangle: triangle as u32,
             };
+            let mut element = id;
             if !self.luminaires.carries(triangle, side) {
                 let luminance = scene.emitted_luminance(at);
                 for band in 0..3 {
                     sum[band] += throughput[band] * std::f64::consts::PI * f64::from(luminance[band]);
                 }
             }
-            let reflectance = scene.reflectance(at);
-            (0..3).for_each(|band| throughput[band] *= f64::from(reflectance[band]));
+            let (reflectance, transmittance) = (scene.reflectance(at), scene.transmittance(at));
+            match self.ids.elements.opposite(id).filter(|_| luminance(transmittance) > 0.0) {
+                None => (0..3).for_each(|band| throughput[band] *= f64::from(reflectance[band])),
+                // What a sheet sends here came from this side, or through it from the other: one of them is followed.
+                Some(opposite) => {
+                    let (rho, tau) = (luminance(reflectance), luminance(transmittance));
+                    let passing = f64::from(tau / (rho + tau));
+                    let passes = f64::from(unit(hash(seed ^ 0x5))) < passing;
+                    let (kept, share) = if passes { (transmittance, passing) } else { (reflectance, 1.0 - passing) };
+                    (0..3).for_each(|band| throughput[band] *= f64::from(kept[band]) / share);
+                    if passes {
+                        (element, spot.normal) = (opposite, -spot.normal);
+                    }
+                }
+            }
             if throughput.iter().all(|t| *t <= 0.0) {
                 return sum;
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
-            let direct = self.one_light(&spot, id as usize, seed);
+            let direct = self.one_light(&spot, element as usize, seed);
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
             let [u, v] = [hash(seed ^ 0x1), hash(seed ^ 0x2)].map(|h| f64::from(unit(h)));
             direction = cosine_direction(&frame(spot.normal), u, v);

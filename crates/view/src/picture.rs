@@ -2,7 +2,8 @@
 //!
 //! A pixel is sampled on a 4 × 4 grid. Samples that see the same smooth surface share one evaluation of irradiance,
 //! because light changes slowly within a pixel where edges do not; reflectance is looked up at each. Edges come out
-//! smooth at the price of little more than one evaluation per pixel.
+//! smooth at the price of little more than one evaluation per pixel. Of a sheet that transmits light the other side is
+//! evaluated too.
 
 use glam::{DVec2, DVec3};
 use radiosity_scene::display::{srgb, tone_map};
@@ -27,8 +28,10 @@ pub struct Seen {
     pub uv: DVec2,
     /// Side that is seen.
     pub side: Side,
-    /// Luminance that the pixel gains per unit of irradiance: Σ ρ/π over the samples, per band.
+    /// Luminance that the pixel gains per unit of irradiance: Σ ρ/π over the samples, per band; Σ τ/π behind a sheet.
     pub response: Bands,
+    /// Whether it lies behind a sheet that is seen: on its other side, whose light comes through.
+    pub behind: bool,
 }
 
 /// All that a camera sees.
@@ -115,17 +118,27 @@ fn cast_pixel(
                 for band in 0..3 {
                     own[band] += share * emitted[band];
                 }
-                let normal = shading_normal(tracer, triangle as usize, uv, side);
-                let similar = seen[first..].iter_mut().find(|s| {
-                    s.side == side && s.place.normal.dot(normal) > SAME_SURFACE && continues(tracer, s, triangle)
-                });
-                match similar {
-                    Some(seen) => (0..3).for_each(|band| seen.response[band] += response[band]),
-                    None => {
-                        let point = tracer.mesh.point(triangle as usize, uv);
-                        let place = Place { point, normal, triangle };
-                        seen.push(Seen { pixel, place, uv, side, response });
+                let mut add = |side: Side, response: Bands, behind: bool| {
+                    let normal = shading_normal(tracer, triangle as usize, uv, side);
+                    let similar = seen[first..].iter_mut().find(|s| {
+                        s.side == side
+                            && s.behind == behind
+                            && s.place.normal.dot(normal) > SAME_SURFACE
+                            && continues(tracer, s, triangle)
+                    });
+                    match similar {
+                        Some(seen) => (0..3).for_each(|band| seen.response[band] += response[band]),
+                        None => {
+                            let point = tracer.mesh.point(triangle as usize, uv);
+                            let place = Place { point, normal, triangle };
+                            seen.push(Seen { pixel, place, uv, side, response, behind });
+                        }
                     }
+                };
+                add(side, response, false);
+                let transmittance = scene.transmittance(at);
+                if transmittance.iter().any(|t| *t > 0.0) {
+                    add(side.other(), transmittance.map(|t| t * share / std::f32::consts::PI), true);
                 }
             }
         }

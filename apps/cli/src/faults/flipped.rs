@@ -37,7 +37,7 @@ pub fn edges(scene: &Scene, mesh: &Mesh) -> BTreeMap<usize, usize> {
         let [s, t] = [*s as usize, *t as usize];
         let object = |t: usize| scene.triangle_object[mesh.source[t] as usize] as usize;
         let judged = forward == also && object(s) == object(t) && mesh.normal(s).dot(mesh.normal(t)) < FOLDED;
-        if judged && !scene.material(mesh.source[t] as usize).double_sided {
+        if judged && !scene.material(mesh.source[t] as usize).has_two_sides() {
             *found.entry(object(t)).or_default() += 1;
         }
     }

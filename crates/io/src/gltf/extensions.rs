@@ -11,6 +11,7 @@ const READ: &[&str] = &[
     "EXT_meshopt_compression",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
+    "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_unlit",
@@ -38,9 +39,9 @@ const HARMLESS: &[&str] = &[
     "KHR_xmp_json_ld",
 ];
 
-/// Change how light passes through a surface; the surface is taken as opaque and says so in a note of its own.
-const APPROXIMATED: &[&str] =
-    &["KHR_materials_diffuse_transmission", "KHR_materials_transmission", "KHR_materials_volume"];
+/// Change how light passes through a surface; the surface is taken as opaque, or as a sheet without thickness, and says so
+/// in a note of its own.
+const APPROXIMATED: &[&str] = &["KHR_materials_transmission", "KHR_materials_volume"];
 
 /// Reports every required extension that is not known.
 pub(crate) fn check(document: &Document, file: &str, faults: &mut Faults) {

@@ -3,14 +3,16 @@
 //! Metal is kept as its share (the scene takes it out of the diffuse reflectance). Emission is cd/m²: factor × picture ×
 //! KHR_materials_emissive_strength. An unlit surface (KHR_materials_unlit) shows its base colour under any light; in a
 //! light simulation it reflects that colour diffusely and gives no light. KHR_materials_pbrSpecularGlossiness
-//! reflects its diffuse colour. A primitive without material is matte grey (0.5) rather than the glTF default, a
+//! reflects its diffuse colour. With KHR_materials_diffuse_transmission the surface is a sheet without thickness: of its
+//! diffuse light the share of `diffuseTransmissionFactor` (times the alpha of its picture) is passed on, tinted, in place
+//! of what the base colour would reflect, and both sides count, whatever `doubleSided` says. A primitive without material is matte grey (0.5) rather than the glTF default, a
 //! white mirror, which no author means by leaving the material out.
 
 use super::Document;
 use super::json::{list, number, numbers, shown, text, whole};
 use crate::picture;
 use glam::{DAffine2, DMat2, DVec2};
-use radiosity_scene::{AlphaMode, Faults, Material, Texture, TextureRef, Wrap};
+use radiosity_scene::{AlphaMode, Faults, Material, Texture, TextureRef, Transmission, Wrap};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -98,12 +100,43 @@ fn material(json: &Value, index: usize, pictures: &mut Pictures<'_>, faults: &mu
         (out.emissive, out.emissive_texture) = ([0.0; 3], None);
         faults.note(&place, "is unlit; its base colour reflects diffusely and it gives no light", "");
     }
-    for name in ["KHR_materials_transmission", "KHR_materials_diffuse_transmission"] {
-        if extension(name).is_some() {
-            faults.note(&place, format!("{name} is not computed; the surface is opaque"), "use alphaMode BLEND");
-        }
+    if let Some(diffuse) = extension("KHR_materials_diffuse_transmission") {
+        let is_unlit = extension("KHR_materials_unlit").is_some();
+        out.transmission = transmission(diffuse, &place, pictures, faults).filter(|_| !is_unlit);
+    }
+    if out.transmits() && extension("KHR_materials_volume").is_some() {
+        let what = "KHR_materials_volume is not computed; light passes the surface as a sheet without thickness";
+        faults.note(&place, what, "");
+    }
+    if extension("KHR_materials_transmission").is_some() {
+        let (opaque, hint) = match out.transmits() {
+            true => ("", ""),
+            false => ("; the surface is opaque", "use alphaMode BLEND or KHR_materials_diffuse_transmission"),
+        };
+        faults.note(&place, format!("KHR_materials_transmission is not computed{opaque}"), hint);
     }
     out
+}
+
+/// What KHR_materials_diffuse_transmission says; `None` where it lets nothing through.
+fn transmission(
+    json: &Value,
+    place: &str,
+    pictures: &mut Pictures<'_>,
+    faults: &mut Faults,
+) -> Option<Transmission> {
+    let name = "diffuseTransmissionFactor";
+    let [replaced] = factor(&wrapped(json, name), name, [0.0], place, faults);
+    let color: [f32; 3] = factor(json, "diffuseTransmissionColorFactor", [1.0; 3], place, faults);
+    if replaced <= 0.0 {
+        return None;
+    }
+    Some(Transmission {
+        transmittance: color.map(|c| c * replaced),
+        texture: pictures.used(json.get("diffuseTransmissionColorTexture"), place, faults),
+        replaced,
+        share_texture: pictures.used(json.get("diffuseTransmissionTexture"), place, faults),
+    })
 }
 
 /// A lone number as a list of one, so that [`factor`] reads it like the others.
@@ -284,6 +317,46 @@ mod tests {
             read_one(json!({"emissiveFactor": [1, 1, 1], "extensions": {"KHR_materials_unlit": {}}}));
         assert_eq!((material.metallic, material.emissive), (0.0, [0.0; 3]));
         assert!(faults.to_string().contains("unlit"), "{faults}");
+    }
+
+    #[test]
+    fn catalogue_13_diffuse_transmission_is_read() {
+        let mut png = std::io::Cursor::new(Vec::new());
+        let texel = image::Rgba([255, 0, 0, 128]);
+        image::RgbaImage::from_pixel(2, 2, texel).write_to(&mut png, image::ImageFormat::Png).unwrap();
+        let bytes = crate::Bytes::from(png.into_inner());
+        let document = Document {
+            json: json!({ "textures": [{ "source": 0 }], "images": [{}], "materials": [
+                { "pbrMetallicRoughness": { "baseColorFactor": [0.8, 0.5, 0.2, 1], "metallicFactor": 0.5 },
+                  "extensions": { "KHR_materials_volume": {}, "KHR_materials_diffuse_transmission": {
+                    "diffuseTransmissionFactor": 0.25, "diffuseTransmissionColorFactor": [1, 0.5, 0],
+                    "diffuseTransmissionTexture": { "index": 0 }, "diffuseTransmissionColorTexture": { "index": 0 } } } },
+                { "extensions": { "KHR_materials_diffuse_transmission": {} } },
+                { "extensions": { "KHR_materials_diffuse_transmission": { "diffuseTransmissionFactor": 1.5 } } } ] }),
+            images: vec![Some(crate::gltf::EncodedImage { mime: "image/png".to_owned(), bytes })],
+            ..Document::default()
+        };
+        let mut faults = Faults::default();
+        let Materials { materials, textures } = read(&document, "t", &mut faults);
+        let first = materials[0].transmission.clone().unwrap();
+        assert_eq!((first.transmittance, first.replaced), ([0.25, 0.125, 0.0], 0.25));
+        assert!(first.texture.is_some() && first.share_texture.is_some() && materials[0].has_two_sides());
+        assert_eq!(materials[1].transmission, None);
+        assert_eq!(materials[2].transmission.as_ref().unwrap().transmittance, [1.0; 3]);
+        let text = faults.to_string();
+        assert!(text.contains("KHR_materials_volume") && text.contains("clamped"), "{text}");
+
+        // ρ = (1 − f a) base (1 − m) and τ = f a colour (1 − m), with a = 128/255.
+        let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]].map(glam::DVec3::from);
+        let mut scene = radiosity_scene::Scene { materials, textures, ..Default::default() };
+        scene.add_triangles("sheet", 0, &[corners]);
+        let at = radiosity_scene::Surface { triangle: 0, uv: DVec2::splat(0.25) };
+        let share = 0.25 * 128.0 / 255.0;
+        let (rho, tau) = (scene.reflectance(at), scene.transmittance(at));
+        for (band, base) in [0.8, 0.5, 0.2].into_iter().enumerate() {
+            assert!((rho[band] - 0.5 * (1.0 - share) * base).abs() < 1e-6, "{rho:?}");
+        }
+        assert!((tau[0] - 0.5 * share).abs() < 1e-6 && tau[1..] == [0.0; 2], "{tau:?}");
     }
 
     #[test]

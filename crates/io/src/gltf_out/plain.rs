@@ -149,8 +149,30 @@ struct Pictures<'a> {
 
 impl Pictures<'_> {
     fn material(&mut self, builder: &mut Builder, material: &Material) -> Result<Value, WriteError> {
+        // glTF mixes: ρ = (1 − f) base, τ = f colour.
+        let mut base = material.base_color;
+        let mut through = None;
+        if let Some(transmission) = &material.transmission {
+            let most = transmission.transmittance.iter().copied().fold(0.0, f32::max);
+            let share = if transmission.replaced > 0.0 { transmission.replaced } else { most };
+            if share > 0.0 {
+                let kept = if share < 1.0 { (1.0 - transmission.replaced) / (1.0 - share) } else { 1.0 };
+                base[..3].iter_mut().for_each(|c| *c *= kept);
+                let color = transmission.transmittance.map(|t| unit(t / share));
+                let mut json =
+                    json!({ "diffuseTransmissionFactor": unit(share), "diffuseTransmissionColorFactor": color });
+                if let Some(texture) = &transmission.texture {
+                    json["diffuseTransmissionColorTexture"] = self.reference(builder, texture)?;
+                }
+                if let Some(texture) = &transmission.share_texture {
+                    json["diffuseTransmissionTexture"] = self.reference(builder, texture)?;
+                }
+                builder.uses("KHR_materials_diffuse_transmission");
+                through = Some(json);
+            }
+        }
         let mut pbr = json!({
-            "baseColorFactor": material.base_color.map(unit), "metallicFactor": unit(material.metallic),
+            "baseColorFactor": base.map(unit), "metallicFactor": unit(material.metallic),
         });
         if let Some(texture) = &material.base_color_texture {
             pbr["baseColorTexture"] = self.reference(builder, texture)?;
@@ -159,12 +181,15 @@ impl Pictures<'_> {
             pbr["metallicRoughnessTexture"] = self.reference(builder, texture)?;
         }
         let mut json = json!({ "name": material.name, "pbrMetallicRoughness": pbr });
+        if let Some(through) = through {
+            json["extensions"]["KHR_materials_diffuse_transmission"] = through;
+        }
         if material.emits() {
             // Factors end at 1; the strength carries the rest.
             let strength = material.emissive.iter().copied().fold(1.0, f32::max);
             json["emissiveFactor"] = json!(material.emissive.map(|e| unit(e / strength)));
             if strength > 1.0 && strength.is_finite() {
-                json["extensions"] = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": strength } });
+                json["extensions"]["KHR_materials_emissive_strength"] = json!({ "emissiveStrength": strength });
                 builder.uses("KHR_materials_emissive_strength");
             }
             if let Some(texture) = &material.emissive_texture {
@@ -179,7 +204,7 @@ impl Pictures<'_> {
             }
             AlphaMode::Blend => json["alphaMode"] = "BLEND".into(),
         }
-        if material.double_sided {
+        if material.has_two_sides() {
             json["doubleSided"] = true.into();
         }
         Ok(json)

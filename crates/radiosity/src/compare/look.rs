@@ -54,7 +54,8 @@ impl Look {
             .map(|s| problem.elements.at(s.place.triangle, s.uv.x as f32, s.uv.y as f32, s.side))
             .collect();
         let mut share = vec![0.0; problem.len()];
-        element.iter().flatten().for_each(|e| share[*e as usize] += 1.0);
+        let seen = view.seen.iter().zip(&element).filter(|(seen, _)| !seen.behind);
+        seen.filter_map(|(_, e)| *e).for_each(|e| share[e as usize] += 1.0);
         let all: f64 = share.iter().sum();
         // Where a camera sees nothing, all is shown by its area.
         let (share, all) = if all > 0.0 { (share, all) } else { (problem.area.clone(), problem.area.iter().sum()) };

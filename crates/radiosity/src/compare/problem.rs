@@ -4,11 +4,11 @@
 //! of the sky, is found once and is the same for all. Elements are uniform and whole: what of them is buried in solids takes
 //! part, and what is cut out of them or lets light pass counts as opaque, for polygons are all that the methods know.
 
-use crate::division::Optics;
+use crate::division::{Optics, Sheets};
 use crate::monitor::Watch;
 use crate::{Error, Monitor};
 use radiosity_scene::{Bands, Elements, Enclosure, Mesh, SkyPatches, luminance};
-use radiosity_solve::DiffuseResponse;
+use radiosity_solve::{DiffuseResponse, Response, SheetResponse};
 use radiosity_trace::{Place, Tracer};
 use radiosity_transport::receivers::Site;
 use radiosity_transport::{ElementReceivers, Exposure, HitTable, IdSpace, Luminaires, Receivers, Shadowing};
@@ -36,6 +36,7 @@ pub(super) struct Problem<'a> {
     /// E + R D, bands interleaved.
     pub emission: Vec<f64>,
     pub reflectance: Vec<f64>,
+    pub sheets: Sheets,
 }
 
 /// The whole of each element, buried or not: what the other methods look out from.
@@ -96,7 +97,7 @@ impl<'a> Problem<'a> {
         let size = element_size(tracer, wanted);
         let elements = Elements::new(scene, mesh, size);
         let enclosure = Enclosure::of_elements(mesh, &elements).map_err(Error::Element)?;
-        let Optics { area, reflectance, exitance } = Optics::new(tracer, &elements);
+        let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
         let n = elements.len();
         let mut problem = Problem {
             tracer,
@@ -109,13 +110,12 @@ impl<'a> Problem<'a> {
             exitance,
             emission: Vec::new(),
             reflectance: reflectance.iter().flatten().map(|r| f64::from(*r)).collect(),
+            sheets,
         };
         problem.direct = problem.direct_light(monitor)?;
-        let own = |(i, band): (usize, usize)| {
-            f64::from(problem.exitance[i][band]) + f64::from(reflectance[i][band]) * f64::from(problem.direct[i][band])
-        };
-        let emission = (0..n).flat_map(|i| (0..3).map(move |band| (i, band))).map(own).collect();
-        problem.emission = emission;
+        let direct: Vec<f64> = problem.direct.iter().flatten().map(|d| f64::from(*d)).collect();
+        let emitted = problem.exitance.iter().flatten().map(|e| f64::from(*e));
+        problem.emission = emitted.zip(problem.returned(&direct)).map(|(e, returned)| e + returned).collect();
         if problem.emission.iter().all(|e| *e == 0.0) {
             return Err(Error::Empty("there is no light to compare: no surface emits, and no lamp or sky reaches one"));
         }
@@ -152,9 +152,16 @@ impl<'a> Problem<'a> {
     }
 
     /// R; with the areas, where F is reciprocal.
-    pub fn response(&self, is_reciprocal: bool) -> DiffuseResponse {
+    pub fn response(&self, is_reciprocal: bool) -> SheetResponse {
         let reciprocal_area = is_reciprocal.then(|| self.area.clone());
-        DiffuseResponse { reflectance: self.reflectance.clone(), bands: 3, reciprocal_area }
+        self.sheets.response(DiffuseResponse { reflectance: self.reflectance.clone(), bands: 3, reciprocal_area })
+    }
+
+    /// R h for an irradiance h, bands interleaved.
+    pub fn returned(&self, h: &[f64]) -> Vec<f64> {
+        let mut b = vec![0.0; h.len()];
+        self.response(false).respond(h, &mut b);
+        b
     }
 
     /// D + F B from F B: irradiance by element, lux per band.

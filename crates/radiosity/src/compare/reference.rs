@@ -1,5 +1,5 @@
 //! The exact discrete answer: factors by `adaptive` at the tightest accuracy that the time allows, and B by conjugate
-//! gradients to rounding.
+//! gradients to rounding (generalised minimal residuals where sheets transmit light).
 
 use super::contender::{Contender, Setting};
 use super::difference::light_error;
@@ -90,7 +90,8 @@ impl Reference {
         let params = Params { tolerance: TOLERANCE, max_steps: 10_000, ..Params::default() };
         let response = problem.response(true);
         let step = |_: &[f64], _: &radiosity_solve::Info| radiosity_solve::Go::On;
-        let info = solve(Solver::Cg, &transport, &response, &problem.emission, &mut radiosity, &params, step)?;
+        let solver = if problem.sheets.is_empty() { Solver::Cg } else { Solver::Gmres };
+        let info = solve(solver, &transport, &response, &problem.emission, &mut radiosity, &params, step)?;
         let mut gathered = vec![0.0; radiosity.len()];
         transport.apply(&radiosity, &mut gathered, 3);
         let irradiance = problem.irradiance(&gathered);

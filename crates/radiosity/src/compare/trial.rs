@@ -146,8 +146,9 @@ fn solved(
     let params = Params { tolerance: TOLERANCE, max_steps: 10_000, ..Params::default() };
     let mut e = problem.emission.clone();
     if let Some(Apart { carried, direct }) = apart {
+        let returned = problem.returned(direct);
         for k in 0..e.len() {
-            e[k] += problem.reflectance[k] * direct[k] - carried[k];
+            e[k] += returned[k] - carried[k];
         }
     }
     let mut b = e.clone();

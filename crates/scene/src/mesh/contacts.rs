@@ -217,13 +217,13 @@ impl Mesh {
             let [a, b, c] = corners[host];
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
             let material = |t: u32| scene.material(self.source[t as usize] as usize);
-            let lit = material(pair[host]).double_sided || heights[1 - host].iter().any(|h| *h > 0.0);
+            let lit = material(pair[host]).has_two_sides() || heights[1 - host].iter().any(|h| *h > 0.0);
             let wide = (b - a).cross(c - a).length() >= 8.0 * self.tolerance * longest;
             lit && wide && material(pair[1 - host]).alpha_mode == AlphaMode::Opaque
         });
 
         let fronts = [0, 1].map(|of| {
-            let double_sided = scene.material(self.source[pair[of] as usize] as usize).double_sided;
+            let double_sided = scene.material(self.source[pair[of] as usize] as usize).has_two_sides();
             (!double_sided).then_some(normals[of])
         });
 

@@ -6,6 +6,7 @@ mod direct;
 mod every_solver;
 mod iterations;
 mod random;
+mod sheets;
 mod shooting;
 mod substructuring;
 mod systems;
