@@ -52,8 +52,8 @@ pub use viewpoint::place_camera;
 pub use radiosity_io as io;
 pub use radiosity_scene::{
     AlphaMode, Bands, Camera, Elements, Enclosure, EnclosureSurface, Facet, Fault, Faults, Material, Mesh, Object,
-    PointLight, PointLightKind, Projection, Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef, Up,
-    Wrap, counted, luminance, size,
+    PointLight, PointLightKind, Projection, Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef,
+    Transmission, Up, Wrap, counted, luminance, size,
 };
 pub use radiosity_solve as solve;
 pub use radiosity_trace::{Found, Place, Tracer};

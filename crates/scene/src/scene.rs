@@ -341,7 +341,8 @@ impl Scene {
             if let Some(transmission) = &material.transmission {
                 let tau = transmission.transmittance;
                 if tau.iter().any(|t| !(0.0..=1.0).contains(t)) || !(0.0..=1.0).contains(&transmission.replaced) {
-                    let what = format!("transmittance {tau:?}, which replaces {} of the reflectance", transmission.replaced);
+                    let what =
+                        format!("transmittance {tau:?}, which replaces {} of the reflectance", transmission.replaced);
                     faults.error(&place, what, "use values in 0..1");
                 }
             }

@@ -25,7 +25,9 @@ pub fn lu<T: Rows>(
     step: impl FnMut(&[f64], &Info) -> Go,
 ) -> Result<Info, SolveError> {
     let Some(sheets) = response.sheets() else {
-        return Err(SolveError::NotApplicable("elimination needs a response of plain surfaces and sheets; use bicgstab"));
+        return Err(SolveError::NotApplicable(
+            "elimination needs a response of plain surfaces and sheets; use bicgstab",
+        ));
     };
     let rho = sheets.reflectance;
     let (bands, n) = (response.bands(), transport.space().dim());

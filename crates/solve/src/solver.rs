@@ -257,7 +257,9 @@ fn check_sheets(sheets: Sheets<'_>, entries: usize, bands: usize) -> Result<(), 
         return Ok(());
     }
     if tau.len() != entries || opposite.len() * bands != entries {
-        return Err(SolveError::NotApplicable("sheets need an other side and a transmittance by band for each unknown"));
+        return Err(SolveError::NotApplicable(
+            "sheets need an other side and a transmittance by band for each unknown",
+        ));
     }
     let is_pair = |(i, other): (usize, &u32)| opposite.get(*other as usize).is_some_and(|back| *back as usize == i);
     if !opposite.iter().enumerate().all(is_pair) {

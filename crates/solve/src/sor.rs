@@ -73,7 +73,8 @@ pub fn sor<T: Rows>(
             let arriving = own_row.before[k] + own_row.own[k / bands] * b[k] + own_row.beyond[k];
             let mut gathered = e[k] + rho[k] * arriving;
             if let Some((_, tau)) = sheets.passed(k / bands, bands) {
-                gathered += tau[k % bands] * (other_row.before[k] + other_row.own[k / bands] * b[k] + other_row.beyond[k]);
+                gathered +=
+                    tau[k % bands] * (other_row.before[k] + other_row.own[k / bands] * b[k] + other_row.beyond[k]);
             }
             r[k] = gathered - b[k];
         }

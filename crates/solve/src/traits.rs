@@ -190,11 +190,7 @@ pub struct SheetResponse {
 
 impl SheetResponse {
     fn as_sheets(&self) -> Sheets<'_> {
-        Sheets {
-            reflectance: &self.diffuse.reflectance,
-            opposite: &self.opposite,
-            transmittance: &self.transmittance,
-        }
+        Sheets { reflectance: &self.diffuse.reflectance, opposite: &self.opposite, transmittance: &self.transmittance }
     }
 }
 

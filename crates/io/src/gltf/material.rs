@@ -119,12 +119,7 @@ fn material(json: &Value, index: usize, pictures: &mut Pictures<'_>, faults: &mu
 }
 
 /// What KHR_materials_diffuse_transmission says; `None` where it lets nothing through.
-fn transmission(
-    json: &Value,
-    place: &str,
-    pictures: &mut Pictures<'_>,
-    faults: &mut Faults,
-) -> Option<Transmission> {
+fn transmission(json: &Value, place: &str, pictures: &mut Pictures<'_>, faults: &mut Faults) -> Option<Transmission> {
     let name = "diffuseTransmissionFactor";
     let [replaced] = factor(&wrapped(json, name), name, [0.0], place, faults);
     let color: [f32; 3] = factor(json, "diffuseTransmissionColorFactor", [1.0; 3], place, faults);

@@ -14,6 +14,7 @@ use std::ops::Range;
 mod cie_171;
 mod closed_forms;
 mod leaks;
+mod sheets;
 
 const PI: f64 = std::f64::consts::PI;
 
