@@ -7,7 +7,7 @@ use crate::Error;
 use crate::division::{Optics, Sheets, divided};
 use crate::equation::{self, Matrix};
 use crate::monitor::{Monitor, Stages, Watch};
-use radiosity_scene::{Bands, Elements, SkyPatches};
+use radiosity_scene::{Bands, Elements, Scene, SkyPatches};
 use radiosity_solve::{DiffuseResponse, Info, Params, Solver};
 use radiosity_trace::Tracer;
 use radiosity_transport::{
@@ -73,9 +73,12 @@ impl SolveOptions {
         }
     }
 
-    /// Refuses a solver that has no right to the factors of the method: only the adaptive one stores a pair once for both
-    /// directions.
-    fn refuse_unfit_solver(&self) -> Result<(), Error> {
+    /// Refuses a solver that has no right to sheets, or to the factors of the method: only the adaptive one stores a pair
+    /// once for both directions.
+    fn refuse_unfit_solver(&self, scene: &Scene) -> Result<(), Error> {
+        if scene.transmits() && !self.solver.takes_sheets() {
+            return Err(Error::Transmission { solver: self.solver });
+        }
         if !self.solver.needs_reciprocity() || self.form_factors == Some(FormFactorMethod::Adaptive) {
             return Ok(());
         }
@@ -170,7 +173,7 @@ impl<'a> Solution<'a> {
     ///
     /// # Errors
     /// [`Error::Memory`] and [`Error::Elimination`] before anything large is allocated; [`Error::Reciprocity`];
-    /// [`Error::Stopped`].
+    /// [`Error::Transmission`]; [`Error::Stopped`].
     pub fn begin(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         if mesh.triangles.is_empty() {
@@ -179,10 +182,7 @@ impl<'a> Solution<'a> {
         let mut options = *options;
         options.suit_method();
         let options = &options;
-        options.refuse_unfit_solver()?;
-        if scene.transmits() && !options.solver.takes_sheets() {
-            return Err(Error::Transmission { solver: options.solver });
-        }
+        options.refuse_unfit_solver(scene)?;
         let stages = Stages::default();
         let element_size = element_size(tracer, options);
         options.refuse_large_matrices(Elements::count(scene, mesh, element_size))?;

@@ -9,7 +9,7 @@
 //! sweeps instead of 269.
 
 use crate::gauge::{Gauge, is_done, remainder};
-use crate::{Go, Info, Params, Response, SolveError, Space, Transport};
+use crate::{Go, Info, Params, Response, Sheets, SolveError, Space, Transport};
 use std::collections::BTreeMap;
 
 /// Solves B = E + R F B in place; `b` holds the start (warm or zero) and the result. `step` sees each iterate. This is
@@ -50,24 +50,7 @@ pub fn deflated_jacobi<T: Transport>(
     let kept: Vec<f64> = v.iter().zip(&r).map(|(v, rfv)| v - rfv).collect();
     let mut coarse = Coarse { balance: balance(&kept), links: Vec::new() };
     if let Some(sheets) = sheets.filter(|sheets| slots > bands && sheets.sides() > 0) {
-        // What sheets pass from part to part of R F v; the balance of a part's own v is without it.
-        let mut links = BTreeMap::new();
-        let mut passed = vec![0.0; n];
-        for k in 0..n {
-            if let Some((other, tau)) = sheets.passed(k / bands, bands) {
-                passed[k] = tau[k % bands] * fv[other * bands + k % bands];
-            }
-        }
-        space.accumulate(&passed, bands, |k, weighted| {
-            if let Some((other, _)) = sheets.passed(k / bands, bands) {
-                let (to, from) = (part(k), part(other * bands + k % bands));
-                if to != from {
-                    *links.entry((to, from)).or_insert(0.0) += weighted;
-                    coarse.balance[to] += weighted;
-                }
-            }
-        });
-        coarse.links = links.into_iter().map(|((to, from), weight)| (to, from, weight)).collect();
+        coarse.link(space, sheets, &fv, bands, part);
     }
 
     transport.apply(b, &mut h, bands);
@@ -112,6 +95,34 @@ struct Coarse {
 const COARSE_SWEEPS: usize = 200;
 
 impl Coarse {
+    /// Takes what sheets pass from part to part of R F v, given F v, out of the balance of the parts' own vectors.
+    fn link(
+        &mut self,
+        space: &impl Space,
+        sheets: Sheets<'_>,
+        fv: &[f64],
+        bands: usize,
+        part: impl Fn(usize) -> usize,
+    ) {
+        let mut passed = vec![0.0; fv.len()];
+        for (k, passed) in passed.iter_mut().enumerate() {
+            if let Some((other, tau)) = sheets.passed(k / bands, bands) {
+                *passed = tau[k % bands] * fv[other * bands + k % bands];
+            }
+        }
+        let mut links = BTreeMap::new();
+        space.accumulate(&passed, bands, |k, weighted| {
+            if let Some((other, _)) = sheets.passed(k / bands, bands) {
+                let (to, from) = (part(k), part(other * bands + k % bands));
+                if to != from {
+                    *links.entry((to, from)).or_insert(0.0) += weighted;
+                    self.balance[to] += weighted;
+                }
+            }
+        });
+        self.links = links.into_iter().map(|((to, from), weight)| (to, from, weight)).collect();
+    }
+
     /// c by part; none where nothing is balanced.
     fn solve(&self, lacking: Vec<f64>) -> Vec<Option<f64>> {
         let positive = |p: usize| self.balance[p] > 0.0;

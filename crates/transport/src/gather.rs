@@ -10,7 +10,7 @@ use crate::receivers::Site;
 use crate::rows::IdSpace;
 use crate::{Columns, Luminaires, Progress, Receivers, Stopped};
 use glam::{DVec2, DVec3};
-use radiosity_scene::{Bands, Side, luminance};
+use radiosity_scene::{Bands, Side, Surface, luminance};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
@@ -129,28 +129,13 @@ impl Gather<'_> {
                 normal: sign * mesh.normal(triangle),
                 triangle: triangle as u32,
             };
-            let mut element = id;
             if !self.luminaires.carries(triangle, side) {
                 let luminance = scene.emitted_luminance(at);
                 for band in 0..3 {
                     sum[band] += throughput[band] * std::f64::consts::PI * f64::from(luminance[band]);
                 }
             }
-            let (reflectance, transmittance) = (scene.reflectance(at), scene.transmittance(at));
-            match self.ids.elements.opposite(id).filter(|_| luminance(transmittance) > 0.0) {
-                None => (0..3).for_each(|band| throughput[band] *= f64::from(reflectance[band])),
-                // What a sheet sends here came from this side, or through it from the other: one of them is followed.
-                Some(opposite) => {
-                    let (rho, tau) = (luminance(reflectance), luminance(transmittance));
-                    let passing = f64::from(tau / (rho + tau));
-                    let passes = f64::from(unit(hash(seed ^ 0x5))) < passing;
-                    let (kept, share) = if passes { (transmittance, passing) } else { (reflectance, 1.0 - passing) };
-                    (0..3).for_each(|band| throughput[band] *= f64::from(kept[band]) / share);
-                    if passes {
-                        (element, spot.normal) = (opposite, -spot.normal);
-                    }
-                }
-            }
+            let element = self.returned(at, id, &mut throughput, &mut spot, seed);
             if throughput.iter().all(|t| *t <= 0.0) {
                 return sum;
             }
@@ -162,6 +147,27 @@ impl Gather<'_> {
             place = spot;
         }
         sum
+    }
+
+    /// Weighs a path by what an element gives back at a spot. What a sheet sends came from this side, or through it from
+    /// the other: one of them is followed. The element whose light goes on, and the spot turned to its side.
+    fn returned(&self, at: Surface, id: u32, throughput: &mut [f64; 3], spot: &mut Place, seed: u32) -> u32 {
+        let scene = self.tracer.scene;
+        let (reflectance, transmittance) = (scene.reflectance(at), scene.transmittance(at));
+        let Some(opposite) = self.ids.elements.opposite(id).filter(|_| luminance(transmittance) > 0.0) else {
+            (0..3).for_each(|band| throughput[band] *= f64::from(reflectance[band]));
+            return id;
+        };
+        let (rho, tau) = (luminance(reflectance), luminance(transmittance));
+        let passing = f64::from(tau / (rho + tau));
+        let passes = f64::from(unit(hash(seed ^ 0x5))) < passing;
+        let (kept, share) = if passes { (transmittance, passing) } else { (reflectance, 1.0 - passing) };
+        (0..3).for_each(|band| throughput[band] *= f64::from(kept[band]) / share);
+        if !passes {
+            return id;
+        }
+        spot.normal = -spot.normal;
+        opposite
     }
 
     /// Direct irradiance at a spot of an element, by one light picked after what the element received.

@@ -113,37 +113,38 @@ fn cast_pixel(
                 let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
                 let at = tracer.mesh.surface(triangle as usize, uv);
                 let emitted = scene.emitted_luminance(at);
-                let reflectance = scene.reflectance(at);
-                let response = reflectance.map(|r| r * share / std::f32::consts::PI);
                 for band in 0..3 {
                     own[band] += share * emitted[band];
                 }
-                let mut add = |side: Side, response: Bands, behind: bool| {
+                let point = tracer.mesh.point(triangle as usize, uv);
+                let sample = |side: Side, given_back: Bands, behind: bool| {
                     let normal = shading_normal(tracer, triangle as usize, uv, side);
-                    let similar = seen[first..].iter_mut().find(|s| {
-                        s.side == side
-                            && s.behind == behind
-                            && s.place.normal.dot(normal) > SAME_SURFACE
-                            && continues(tracer, s, triangle)
-                    });
-                    match similar {
-                        Some(seen) => (0..3).for_each(|band| seen.response[band] += response[band]),
-                        None => {
-                            let point = tracer.mesh.point(triangle as usize, uv);
-                            let place = Place { point, normal, triangle };
-                            seen.push(Seen { pixel, place, uv, side, response, behind });
-                        }
-                    }
+                    let response = given_back.map(|given| given * share / std::f32::consts::PI);
+                    Seen { pixel, place: Place { point, normal, triangle }, uv, side, response, behind }
                 };
-                add(side, response, false);
+                add(tracer, seen, first, sample(side, scene.reflectance(at), false));
                 let transmittance = scene.transmittance(at);
                 if transmittance.iter().any(|t| *t > 0.0) {
-                    add(side.other(), transmittance.map(|t| t * share / std::f32::consts::PI), true);
+                    add(tracer, seen, first, sample(side.other(), transmittance, true));
                 }
             }
         }
     }
     own
+}
+
+/// Adds a sample to what the pixel, from `first` on, has seen: to one of the same surface and side, if there is one.
+fn add(tracer: &Tracer, seen: &mut Vec<Seen>, first: usize, sample: Seen) {
+    let similar = seen[first..].iter_mut().find(|s| {
+        s.side == sample.side
+            && s.behind == sample.behind
+            && s.place.normal.dot(sample.place.normal) > SAME_SURFACE
+            && continues(tracer, s, sample.place.triangle)
+    });
+    match similar {
+        Some(seen) => (0..3).for_each(|band| seen.response[band] += sample.response[band]),
+        None => seen.push(sample),
+    }
 }
 
 /// Whether a triangle belongs to the smooth surface that an earlier sample of the pixel lies on.

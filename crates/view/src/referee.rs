@@ -7,7 +7,7 @@
 //! a plain path tracer is 1.7 to 4.5 times worse, and comparing with the worse would flatter us.
 
 use glam::{DVec2, DVec3};
-use radiosity_scene::{Bands, Side, luminance};
+use radiosity_scene::{Bands, Side, Surface, luminance};
 use radiosity_trace::sampling::{Random, Sequence, cosine_direction, frame};
 use radiosity_trace::{Found, Place, Tracer};
 use std::f64::consts::PI;
@@ -127,25 +127,7 @@ impl<'a> Referee<'a> {
                     sum[band] += throughput[band] * weight * PI * f64::from(luminance[band]);
                 }
             }
-            let (reflectance, transmittance) = (self.tracer.scene.reflectance(at), self.tracer.scene.transmittance(at));
-            let mut normal = normal;
-            if luminance(transmittance) > 0.0 {
-                // A sheet: its light came from this side, or through it from the other; one of the two is followed.
-                let (rho, tau) = (luminance(reflectance), luminance(transmittance));
-                let passing = f64::from(tau / (rho + tau));
-                let passes = random.next_unit() < passing;
-                let (kept, share) = if passes { (transmittance, passing) } else { (reflectance, 1.0 - passing) };
-                for (t, kept) in throughput.iter_mut().zip(kept) {
-                    *t *= f64::from(kept) / share;
-                }
-                if passes {
-                    normal = -normal;
-                }
-            } else {
-                for (t, rho) in throughput.iter_mut().zip(reflectance) {
-                    *t *= f64::from(rho);
-                }
-            }
+            let normal = self.returned(at, normal, &mut throughput, random);
             let strongest = throughput.iter().fold(0f64, |m, t| m.max(*t));
             if strongest <= 0.0 {
                 break;
@@ -162,6 +144,22 @@ impl<'a> Referee<'a> {
             choice = std::array::from_fn(|_| random.next_unit());
         }
         sum
+    }
+
+    /// Weighs a path by what a surface gives back. The light of a sheet came from the side that is seen, or through it from
+    /// the other; one of the two is followed. The normal of the side on which the path goes on.
+    fn returned(&self, at: Surface, normal: DVec3, throughput: &mut [f64; 3], random: &mut Random) -> DVec3 {
+        let (reflectance, transmittance) = (self.tracer.scene.reflectance(at), self.tracer.scene.transmittance(at));
+        let (rho, tau) = (luminance(reflectance), luminance(transmittance));
+        if tau <= 0.0 {
+            throughput.iter_mut().zip(reflectance).for_each(|(t, rho)| *t *= f64::from(rho));
+            return normal;
+        }
+        let passing = f64::from(tau / (rho + tau));
+        let passes = random.next_unit() < passing;
+        let (kept, share) = if passes { (transmittance, passing) } else { (reflectance, 1.0 - passing) };
+        throughput.iter_mut().zip(kept).for_each(|(t, kept)| *t *= f64::from(kept) / share);
+        if passes { -normal } else { normal }
     }
 
     /// Solid-angle density with which `sample_light` would have chosen a point of an emitter.
