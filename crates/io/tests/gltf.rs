@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use radiosity_io::{LoadOptions, Loaded, Memory, gltf};
+use radiosity_scene::{Material, Transmission};
 use serde_json::{Value, json};
 
 /// A triangle (0,0,0) (1,0,0) (0,1,0) facing +Z with normals, and further floats behind it, in `mesh.bin`.
@@ -200,9 +201,12 @@ fn catalogue_90_ranges_are_named_with_the_object() {
     let mut scene = loaded.scene;
     scene.materials[0].base_color[0] = 1.2;
     scene.materials[1].emissive[0] = f32::NAN;
+    let transmission = Transmission { transmittance: [0.1, 0.6, 0.1], ..Transmission::default() };
+    scene.materials[2] =
+        Material { name: "opal".into(), base_color: [0.5; 4], transmission: Some(transmission), ..Material::default() };
     scene.positions[0].x = f64::NAN;
     let said = scene.validate("t").to_string();
-    for what in ["base colour", "emission"] {
+    for what in ["base colour", "emission", "material 'opal': reflectance and transmittance sum to [0.6, 1.1, 0.6]"] {
         assert!(said.contains(what), "{what}\n{said}");
     }
     assert!(scene.validate("t").has_errors());

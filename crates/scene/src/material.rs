@@ -1,6 +1,6 @@
 //! How a surface answers light, as its author wrote it down.
 
-use crate::{Bands, Wrap};
+use crate::{Bands, Faults, Wrap};
 use glam::{DAffine2, DVec2};
 
 /// Largest reflectance the solver accepts. At 1 a closed scene has no bounded solution; 0.99 keeps the guaranteed
@@ -43,6 +43,9 @@ pub enum AlphaMode {
     /// The surface covers the share `alpha` of the light and lets the rest pass unchanged.
     Blend,
 }
+
+/// By how much ρ + τ may be above one: the rounding of three numbers that are one together.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// What a thin sheet passes on: light that falls on one side leaves the other, diffusely.
 ///
@@ -122,15 +125,31 @@ impl Material {
         self.double_sided || self.transmission.is_some()
     }
 
-    /// The largest ρ + τ of each band, whatever pictures and vertex colours make of it (they only take away): linear in
-    /// the share that transmits, so that it is found where that is nothing or all. `None` where nothing is transmitted.
-    pub fn most_returned(&self) -> Option<Bands> {
-        let transmission = self.transmission.as_ref()?;
+    /// Adds what is wrong with the transmission: values that are no shares, and bands in which ρ + τ is above one. The
+    /// rest, α = 1 − ρ − τ, is absorbed.
+    pub fn check_transmission(&self, place: &str, faults: &mut Faults) {
+        let Some(transmission) = &self.transmission else { return };
+        let (tau, replaced) = (transmission.transmittance, transmission.replaced);
+        if tau.iter().chain([&replaced]).any(|share| !(0.0..=1.0).contains(share)) {
+            let what = format!("transmittance {tau:?}, which takes the place of {replaced} of the reflectance");
+            faults.error(place, what, "use values in 0..1");
+            return;
+        }
+        let returned = self.most_returned(transmission);
+        if returned.iter().any(|sum| *sum > 1.0 + ROUNDING) {
+            let what = format!("reflectance and transmittance sum to {returned:?}, above 1");
+            faults.error(place, what, "no surface gives back more light than it gets: make one of them smaller");
+        }
+    }
+
+    /// The largest ρ + τ of each band. Pictures, and vertex colours in 0..1, only take away; the sum is linear in the
+    /// share that transmits, so it is largest where that is nothing or all.
+    fn most_returned(&self, transmission: &Transmission) -> Bands {
         let diffuse = if self.metallic_texture.is_some() { 1.0 } else { 1.0 - self.metallic };
-        Some(std::array::from_fn(|band| {
+        std::array::from_fn(|band| {
             let (base, tau) = (self.base_color[band], transmission.transmittance[band]);
             let all = base * (1.0 - transmission.replaced) + tau;
             diffuse * if transmission.share_texture.is_some() { base.max(all) } else { all }
-        }))
+        })
     }
 }

@@ -69,9 +69,6 @@ pub struct Scene {
     pub sky: Sky,
 }
 
-/// By how much ρ + τ may be above one: the rounding of three numbers that are one together.
-const ROUNDING: f32 = 4.0 * f32::EPSILON;
-
 /// Which axis points to the zenith.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Up {
@@ -304,7 +301,8 @@ impl Scene {
     }
 
     /// Checks what every later stage takes for granted, naming each fault: finite positions, indices in range,
-    /// areas above zero, reflectances in 0..1, finite emission of at least 0, some area at all. Drops nothing.
+    /// areas above zero, reflectances in 0..1, with transmittances at most 1, finite emission of at least 0, some area at
+    /// all. Drops nothing.
     pub fn validate(&self, place: &str) -> Faults {
         let mut faults = Faults::default();
         let of = |object: &Object| format!("{place}: object '{}'", object.name);
@@ -338,20 +336,7 @@ impl Scene {
             if material.emissive.iter().any(|e| !e.is_finite() || *e < 0.0) {
                 faults.error(&place, format!("emission {:?}", material.emissive), "use finite values, 0 or more");
             }
-            if let Some(transmission) = &material.transmission {
-                let tau = transmission.transmittance;
-                if tau.iter().any(|t| !(0.0..=1.0).contains(t)) || !(0.0..=1.0).contains(&transmission.replaced) {
-                    let what =
-                        format!("transmittance {tau:?}, which replaces {} of the reflectance", transmission.replaced);
-                    faults.error(&place, what, "use values in 0..1");
-                }
-            }
-            // A share of the light is absorbed, α = 1 − ρ − τ, and none is made.
-            let returned = material.most_returned().unwrap_or_default();
-            if returned.iter().any(|sum| *sum > 1.0 + ROUNDING) {
-                let what = format!("reflectance and transmittance sum to {returned:?}");
-                faults.error(&place, what, "no surface gives back more light than it gets: make one of them smaller");
-            }
+            material.check_transmission(&place, &mut faults);
         }
         if self.triangles.is_empty() {
             faults.error(place, "no triangle with an area", "a scene needs at least one surface");

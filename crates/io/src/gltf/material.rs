@@ -5,8 +5,9 @@
 //! light simulation it reflects that colour diffusely and gives no light. KHR_materials_pbrSpecularGlossiness
 //! reflects its diffuse colour. With KHR_materials_diffuse_transmission the surface is a sheet without thickness: of its
 //! diffuse light the share of `diffuseTransmissionFactor` (times the alpha of its picture) is passed on, tinted, in place
-//! of what the base colour would reflect, and both sides count, whatever `doubleSided` says. A primitive without material is matte grey (0.5) rather than the glTF default, a
-//! white mirror, which no author means by leaving the material out.
+//! of what the base colour would reflect, and both sides count, whatever `doubleSided` says. Where that gives back more
+//! light than arrives it is refused: which of the two the author meant is not known. A primitive without material is matte
+//! grey (0.5) rather than the glTF default, a white mirror, which no author means by leaving the material out.
 
 use super::Document;
 use super::json::{list, number, numbers, shown, text, whole};
@@ -100,34 +101,43 @@ fn material(json: &Value, index: usize, pictures: &mut Pictures<'_>, faults: &mu
         (out.emissive, out.emissive_texture) = ([0.0; 3], None);
         faults.note(&place, "is unlit; its base colour reflects diffusely and it gives no light", "");
     }
+    pass_light(&mut out, json, &place, pictures, faults);
+    out
+}
+
+/// Adds how light passes through the surface, and says what of it is not computed.
+fn pass_light(out: &mut Material, json: &Value, place: &str, pictures: &mut Pictures<'_>, faults: &mut Faults) {
+    let extension = |name: &str| json.get("extensions").and_then(|all| all.get(name));
     if let Some(diffuse) = extension("KHR_materials_diffuse_transmission") {
         let is_unlit = extension("KHR_materials_unlit").is_some();
-        out.transmission = transmission(diffuse, &place, pictures, faults).filter(|_| !is_unlit);
+        out.transmission = transmission(diffuse, place, pictures, faults).filter(|_| !is_unlit);
+        out.check_transmission(place, faults);
     }
     if out.transmits() && extension("KHR_materials_volume").is_some() {
         let what = "KHR_materials_volume is not computed; light passes the surface as a sheet without thickness";
-        faults.note(&place, what, "");
+        faults.note(place, what, "");
     }
     if extension("KHR_materials_transmission").is_some() {
         let (opaque, hint) = match out.transmits() {
             true => ("", ""),
             false => ("; the surface is opaque", "use alphaMode BLEND or KHR_materials_diffuse_transmission"),
         };
-        faults.note(&place, format!("KHR_materials_transmission is not computed{opaque}"), hint);
+        faults.note(place, format!("KHR_materials_transmission is not computed{opaque}"), hint);
     }
-    out
 }
 
 /// What KHR_materials_diffuse_transmission says; `None` where it lets nothing through.
 fn transmission(json: &Value, place: &str, pictures: &mut Pictures<'_>, faults: &mut Faults) -> Option<Transmission> {
     let name = "diffuseTransmissionFactor";
-    let [replaced] = factor(&wrapped(json, name), name, [0.0], place, faults);
-    let color: [f32; 3] = factor(json, "diffuseTransmissionColorFactor", [1.0; 3], place, faults);
-    if replaced <= 0.0 {
+    // Not clamped: what is more than arrives is refused with the reflectance that it adds to.
+    let [replaced] = given(&wrapped(json, name), name, place, faults).unwrap_or([0.0]);
+    let color: [f64; 3] = given(json, "diffuseTransmissionColorFactor", place, faults).unwrap_or([1.0; 3]);
+    if replaced == 0.0 {
         return None;
     }
+    let replaced = replaced as f32;
     Some(Transmission {
-        transmittance: color.map(|c| c * replaced),
+        transmittance: color.map(|c| c as f32 * replaced),
         texture: pictures.used(json.get("diffuseTransmissionColorTexture"), place, faults),
         replaced,
         share_texture: pictures.used(json.get("diffuseTransmissionTexture"), place, faults),
@@ -142,13 +152,19 @@ fn wrapped(json: &Value, name: &str) -> Value {
     }
 }
 
+/// `N` numbers, if they are there; what is not `N` numbers is reported.
+fn given<const N: usize>(json: &Value, name: &str, place: &str, faults: &mut Faults) -> Option<[f64; N]> {
+    let value = json.get(name)?;
+    let given = numbers::<N>(value);
+    if given.is_none() {
+        faults.warning(place, format!("{name} is {}, not {N} numbers; ignored", shown(Some(value))), "correct it");
+    }
+    given
+}
+
 /// `N` factors in 0..1; what is not is reported and clamped.
 fn factor<const N: usize>(json: &Value, name: &str, default: [f32; N], place: &str, faults: &mut Faults) -> [f32; N] {
-    let Some(value) = json.get(name) else { return default };
-    let Some(given) = numbers::<N>(value) else {
-        faults.warning(place, format!("{name} is {}, not {N} numbers; ignored", shown(Some(value))), "correct it");
-        return default;
-    };
+    let Some(given) = given(json, name, place, faults) else { return default };
     if given.iter().any(|x| !(0.0..=1.0).contains(x)) {
         let what = format!("{name} is {given:?}; clamped to 0..1");
         faults.warning(place, what, "no surface reflects more light than it gets; emission has emissiveStrength");
@@ -326,8 +342,7 @@ mod tests {
                   "extensions": { "KHR_materials_volume": {}, "KHR_materials_diffuse_transmission": {
                     "diffuseTransmissionFactor": 0.25, "diffuseTransmissionColorFactor": [1, 0.5, 0],
                     "diffuseTransmissionTexture": { "index": 0 }, "diffuseTransmissionColorTexture": { "index": 0 } } } },
-                { "extensions": { "KHR_materials_diffuse_transmission": {} } },
-                { "extensions": { "KHR_materials_diffuse_transmission": { "diffuseTransmissionFactor": 1.5 } } } ] }),
+                { "extensions": { "KHR_materials_diffuse_transmission": {} } } ] }),
             images: vec![Some(crate::gltf::EncodedImage { mime: "image/png".to_owned(), bytes })],
             ..Document::default()
         };
@@ -337,9 +352,7 @@ mod tests {
         assert_eq!((first.transmittance, first.replaced), ([0.25, 0.125, 0.0], 0.25));
         assert!(first.texture.is_some() && first.share_texture.is_some() && materials[0].has_two_sides());
         assert_eq!(materials[1].transmission, None);
-        assert_eq!(materials[2].transmission.as_ref().unwrap().transmittance, [1.0; 3]);
-        let text = faults.to_string();
-        assert!(text.contains("KHR_materials_volume") && text.contains("clamped"), "{text}");
+        assert!(faults.to_string().contains("KHR_materials_volume") && !faults.has_errors(), "{faults}");
 
         // ρ = (1 − f a) base (1 − m) and τ = f a colour (1 − m), with a = 128/255.
         let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]].map(glam::DVec3::from);
@@ -352,6 +365,35 @@ mod tests {
             assert!((rho[band] - 0.5 * (1.0 - share) * base).abs() < 1e-6, "{rho:?}");
         }
         assert!((tau[0] - 0.5 * share).abs() < 1e-6 && tau[1..] == [0.0; 2], "{tau:?}");
+    }
+
+    /// All of them at once, each by the name of its material.
+    #[test]
+    fn catalogue_12_more_light_than_arrives_is_refused() {
+        let sheet = |name: &str, base: f64, factor: f64, color: f64| {
+            json!({ "name": name, "pbrMetallicRoughness": { "baseColorFactor": [0, base, 0, 1], "metallicFactor": 0 },
+                "extensions": { "KHR_materials_diffuse_transmission": {
+                    "diffuseTransmissionFactor": factor, "diffuseTransmissionColorFactor": [0, color, 0] } } })
+        };
+        let materials = [
+            sheet("all of it", 1.0, 0.3, 1.0),
+            sheet("bright", 0.9, 0.5, 1.2),
+            sheet("brighter", 0.5, 1.5, 0.5),
+            sheet("odd", 0.5, -0.1, 1.0),
+        ];
+        let document = Document { json: json!({ "materials": materials }), ..Document::default() };
+        let mut faults = Faults::default();
+        read(&document, "t.gltf", &mut faults);
+        let said: Vec<String> = faults.0.iter().map(ToString::to_string).collect();
+        let expected = [
+            "error: t.gltf: materials[1] 'bright': reflectance and transmittance sum to [0.0, 1.05, 0.0], above 1",
+            "error: t.gltf: materials[2] 'brighter': transmittance [0.0, 0.75, 0.0], which takes the place of 1.5",
+            "error: t.gltf: materials[3] 'odd': transmittance",
+        ];
+        assert_eq!(said.len(), expected.len(), "{faults}");
+        for (said, expected) in said.iter().zip(expected) {
+            assert!(said.starts_with(expected), "{said}");
+        }
     }
 
     #[test]
