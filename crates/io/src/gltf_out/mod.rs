@@ -15,6 +15,7 @@
 mod glb;
 mod lamps;
 mod materials;
+mod mixture;
 mod plain;
 mod rewrite;
 mod skin;
@@ -137,6 +138,14 @@ pub enum WriteError {
     /// A GLB cannot hold more than 4 GiB.
     #[error("{0} bytes do not fit into a GLB; write fewer texels or vertices")]
     TooLarge(u64),
+    /// A material is none that glTF can say.
+    #[error("material '{name}': {what}")]
+    Material {
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        what: String,
+    },
     /// A picture could not be encoded.
     #[error("picture '{name}': {what}")]
     Picture {

@@ -2,6 +2,7 @@
 
 use super::glb::{Builder, Target};
 use super::materials::{Materials, unit};
+use super::mixture::{Mixture, mixture};
 use super::{Light, LitPrimitive, LitVertex, Style, WriteError, vertices};
 use glam::{DVec2, Vec3};
 use radiosity_scene::{AlphaMode, Camera, Material, Object, Projection, Scene, Texture, TextureRef, Up, Wrap};
@@ -149,28 +150,11 @@ struct Pictures<'a> {
 
 impl Pictures<'_> {
     fn material(&mut self, builder: &mut Builder, material: &Material) -> Result<Value, WriteError> {
-        // glTF mixes: ρ = (1 − f) base, τ = f colour.
-        let mut base = material.base_color;
-        let mut through = None;
-        if let Some(transmission) = &material.transmission {
-            let most = transmission.transmittance.iter().copied().fold(0.0, f32::max);
-            let share = if transmission.replaced > 0.0 { transmission.replaced } else { most };
-            if share > 0.0 {
-                let kept = if share < 1.0 { (1.0 - transmission.replaced) / (1.0 - share) } else { 1.0 };
-                base[..3].iter_mut().for_each(|c| *c *= kept);
-                let color = transmission.transmittance.map(|t| unit(t / share));
-                let mut json =
-                    json!({ "diffuseTransmissionFactor": unit(share), "diffuseTransmissionColorFactor": color });
-                if let Some(texture) = &transmission.texture {
-                    json["diffuseTransmissionColorTexture"] = self.reference(builder, texture)?;
-                }
-                if let Some(texture) = &transmission.share_texture {
-                    json["diffuseTransmissionTexture"] = self.reference(builder, texture)?;
-                }
-                builder.uses("KHR_materials_diffuse_transmission");
-                through = Some(json);
-            }
-        }
+        let (base, through) =
+            match mixture(material).map_err(|what| WriteError::Material { name: material.name.clone(), what })? {
+                None => (material.base_color, None),
+                Some(mixture) => (mixture.base, Some(self.transmission(builder, material, &mixture)?)),
+            };
         let mut pbr = json!({
             "baseColorFactor": base.map(unit), "metallicFactor": unit(material.metallic),
         });
@@ -207,6 +191,28 @@ impl Pictures<'_> {
         if material.has_two_sides() {
             json["doubleSided"] = true.into();
         }
+        Ok(json)
+    }
+
+    /// KHR_materials_diffuse_transmission.
+    fn transmission(
+        &mut self,
+        builder: &mut Builder,
+        material: &Material,
+        mixture: &Mixture,
+    ) -> Result<Value, WriteError> {
+        let mut json = json!({
+            "diffuseTransmissionFactor": mixture.share, "diffuseTransmissionColorFactor": mixture.color,
+        });
+        if let Some(transmission) = &material.transmission {
+            if let Some(texture) = &transmission.texture {
+                json["diffuseTransmissionColorTexture"] = self.reference(builder, texture)?;
+            }
+            if let Some(texture) = &transmission.share_texture {
+                json["diffuseTransmissionTexture"] = self.reference(builder, texture)?;
+            }
+        }
+        builder.uses("KHR_materials_diffuse_transmission");
         Ok(json)
     }
 

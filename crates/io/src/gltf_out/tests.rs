@@ -1,7 +1,7 @@
 use super::*;
 use crate::{LoadOptions, Memory, gltf};
 use glam::{DVec3, Vec2, Vec3};
-use radiosity_scene::{Material, Up};
+use radiosity_scene::{Material, Transmission, Up};
 use serde_json::{Value, json};
 
 /// Bytes of the attributes and an index list for one square: positions, normals, joints, weights, matrices.
@@ -351,6 +351,56 @@ fn a_scene_without_gltf_comes_back_as_it_was() {
     assert!((vector_area(&after, 0) - 2.0 * DVec3::Y).length() < 1e-6, "{}", vector_area(&after, 0));
     let eye = after.cameras[0].world_from_camera.w_axis.truncate();
     assert!((eye - DVec3::new(3.0, 3.0, -3.0)).length() < 1e-5, "{eye}");
+}
+
+/// ρ and τ come back to the rounding of single precision, or are refused by the name of their material: they were clamped.
+#[test]
+fn catalogue_13_a_sheet_comes_back_as_it_was_or_is_refused() {
+    let texture = |uv_set| radiosity_scene::TextureRef {
+        texture: 0,
+        uv_set,
+        transform: Default::default(),
+        wrap: [radiosity_scene::Wrap::Clamp; 2],
+        nearest: false,
+    };
+    let texels = vec![[128, 64, 32, 51], [255, 0, 200, 255]];
+    let picture = radiosity_scene::Texture { name: "p".into(), width: 2, height: 1, texels };
+    let plain = Transmission { transmittance: [0.4, 0.2, 0.3], ..Transmission::default() };
+    let mixed = Transmission { replaced: 0.7, texture: Some(texture(0)), ..plain.clone() };
+    let partly = Transmission { share_texture: Some(texture(0)), ..mixed.clone() };
+    let sheet = |transmission: Transmission| Material {
+        name: "silk".into(),
+        base_color: [0.6, 0.3, 0.1, 1.0],
+        base_color_texture: transmission.texture,
+        metallic: 0.25,
+        transmission: Some(transmission),
+        ..Material::default()
+    };
+    let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 2.0, 0.0), DVec3::Y * 2.0];
+    let written = |material: Material| {
+        let mut scene = Scene { materials: vec![material], textures: vec![picture.clone()], ..Scene::default() };
+        scene.add_quad("sheet", 0, square);
+        let [a, b, c, d] = [[0., 0.], [1., 0.], [1., 1.], [0., 1.]].map(Vec2::from);
+        scene.uvs[0] = vec![a, b, c, a, c, d];
+        let bytes = lit_glb(&scene, None, &[], &Style::Vertices);
+        (scene, bytes)
+    };
+    for transmission in [plain.clone(), mixed, partly] {
+        let (before, bytes) = written(sheet(transmission));
+        let after = load(&bytes.unwrap());
+        assert!(!after.faults.has_errors(), "{}", after.faults);
+        let after = after.scene;
+        for uv in [(0.1, 0.2), (0.6, 0.3), (0.3, 0.6)] {
+            let at = radiosity_scene::Surface { triangle: 0, uv: uv.into() };
+            let [there, here] =
+                [&before, &after].map(|scene| [scene.reflectance(at), scene.transmittance(at)].concat());
+            assert!(there.iter().zip(&here).all(|(a, b)| (a - b).abs() < 1e-6), "{there:?} {here:?}");
+        }
+    }
+    let narrow = Transmission { transmittance: [0.1, 0.9, 0.0], ..plain };
+    let (_, refused) = written(sheet(narrow));
+    let error = refused.unwrap_err();
+    assert!(matches!(&error, WriteError::Material { name, .. } if name == "silk"), "{error}");
 }
 
 /// Every object looked through all primitives, so that time went with the square of their number.
