@@ -1,7 +1,8 @@
 //! MTL material libraries: `Kd`, `Ke`, `d`/`Tr`, `map_Kd`, `map_Ke`.
 //!
 //! Kd and Ke are linear values as they stand, Ke in cd/m²; pictures are sRGB. `d` below 1 lets that share of the light
-//! pass (alpha blend). Where a picture comes without its factor the factor is 1; a material without either is grey.
+//! pass (alpha blend). `Tf` and the glass of `illum` are not computed, and told where they would matter. Where a picture
+//! comes without its factor the factor is 1; a material without either is grey.
 
 use crate::{Source, picture};
 use glam::{DAffine2, DMat2, DVec2};
@@ -10,6 +11,9 @@ use std::collections::BTreeMap;
 
 /// Reflectance of faces without a material, or whose material has no Kd.
 pub(crate) const GREY: f32 = 0.5;
+
+/// What `illum` says of surfaces that light passes through, by glass or by refraction.
+const GLASS: [&str; 4] = ["4", "6", "7", "9"];
 
 /// Materials by name, gathered from all libraries of an OBJ.
 pub(crate) struct Library<'a> {
@@ -73,6 +77,8 @@ impl<'a> Library<'a> {
                 "Ke" => draft.ke = color(rest, keyword, &place, faults).or(draft.ke),
                 "d" => draft.opacity = one(rest.trim_start_matches("-halo"), keyword, &place, faults).or(draft.opacity),
                 "Tr" => draft.opacity = one(rest, keyword, &place, faults).map(|t| 1.0 - t).or(draft.opacity),
+                "Tf" => draft.filter = color(rest, keyword, &place, faults).or(draft.filter),
+                "illum" => draft.is_glass = GLASS.contains(&rest),
                 "map_Kd" => draft.map_kd = self.map(rest, folder, &place, faults),
                 "map_Ke" => draft.map_ke = self.map(rest, folder, &place, faults),
                 "map_d" => {
@@ -111,6 +117,7 @@ impl<'a> Library<'a> {
         let ke = draft.ke.unwrap_or([if draft.map_ke.is_some() { 1.0 } else { 0.0 }; 3]);
         let ke = limited(ke, 1e12, "Ke", "check the unit of luminance", &draft.place, faults);
         let [opacity, ..] = limited([draft.opacity.unwrap_or(1.0); 3], 1.0, "d", "use 0 to 1", &draft.place, faults);
+        draft.tell_transmission(opacity, faults);
         let material = Material {
             base_color: [kd[0], kd[1], kd[2], opacity],
             base_color_texture: draft.map_kd,
@@ -192,8 +199,29 @@ struct Draft {
     kd: Option<[f64; 3]>,
     ke: Option<[f64; 3]>,
     opacity: Option<f64>,
+    /// `Tf`: what of the light that passes.
+    filter: Option<[f64; 3]>,
+    is_glass: bool,
     map_kd: Option<TextureRef>,
     map_ke: Option<TextureRef>,
+}
+
+impl Draft {
+    /// Says what of the light that would pass is lost. A filter of all or nothing on a surface that is opaque otherwise is
+    /// what exporters write where nobody meant any.
+    fn tell_transmission(&self, opacity: f32, faults: &mut Faults) {
+        let name = &self.name;
+        let hint = "d below 1 lets light pass unscattered; KHR_materials_diffuse_transmission of glTF scatters it";
+        let filter = self.filter.unwrap_or([1.0; 3]);
+        let is_usual = filter == [1.0; 3] || filter == [0.0; 3];
+        let what = match opacity < 1.0 {
+            true if filter != [1.0; 3] => format!("Tf {filter:?} is not computed; what passes by d keeps its colour"),
+            false if self.is_glass => "illum 4, 6, 7 or 9 (glass) is not computed; the surface is opaque".to_owned(),
+            false if !is_usual => format!("Tf {filter:?} is not computed; the surface is opaque"),
+            _ => return,
+        };
+        faults.warning(&self.place, format!("material '{name}': {what}"), hint);
+    }
 }
 
 /// A file name as an address: a percent sign in it is meant as one.
@@ -261,5 +289,25 @@ mod tests {
         for expected in ["'m/gone.png' does not exist", "m/l.mtl:9: Kd '2 nan x'", "clamped"] {
             assert!(text.contains(expected), "{text}");
         }
+    }
+
+    /// They were passed over in silence.
+    #[test]
+    fn light_that_would_pass_is_told() {
+        let mtl = "newmtl usual\nTf 1 1 1\nillum 2\nnewmtl off\nTf 0 0 0\nnewmtl glass\nillum 7\nnewmtl pane\nillum 4\nd 0.5\n\
+                   newmtl silk\nTf 0.2 0.3 0.4\nnewmtl tinted\nTf 1 0 0\nd 0.5\nnewmtl odd\nTf spectral a.rfl\n";
+        let memory = Memory([("l.mtl".to_owned(), mtl.as_bytes().to_vec())].into());
+        let (mut library, mut faults) = (Library::new(&memory), Faults::default());
+        library.read("l.mtl", "t.obj:1", &mut faults);
+        let said: Vec<String> = faults.0.iter().map(ToString::to_string).collect();
+        let expected = [
+            "warning: l.mtl:6: material 'glass': illum 4, 6, 7 or 9 (glass) is not computed; the surface is opaque",
+            "warning: l.mtl:11: material 'silk': Tf [0.2, 0.3, 0.4] is not computed; the surface is opaque",
+            "warning: l.mtl:17: Tf 'spectral a.rfl' is not three numbers",
+            "warning: l.mtl:13: material 'tinted': Tf [1.0, 0.0, 0.0] is not computed; what passes by d",
+        ];
+        assert_eq!(said.len(), expected.len(), "{faults}");
+        assert!(expected.iter().all(|line| said.iter().any(|said| said.starts_with(line))), "{faults}");
+        assert_eq!(library.materials[4].alpha_mode, AlphaMode::Opaque);
     }
 }
