@@ -6,7 +6,7 @@ use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::report::{LightmapReport, Report};
 use crate::views;
-use crate::{Failure, Global, numbers};
+use crate::{Failure, Global, faults, numbers};
 use clap::{Args, ValueEnum};
 use radiosity::io::gltf_out::{Encoding, Style, lit_glb};
 use radiosity::io::image_out::encode_exr;
@@ -83,7 +83,11 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.promise(path, &["png", "exr"])?;
     }
     progress.part("reading");
-    let input = input::load(&arguments.scene, global, progress)?;
+    let mut input = input::load(&arguments.scene, global, progress)?;
+    if let Some(fault) = faults::sheets::warning(&input.scene, &input.title) {
+        progress.say(&fault.to_string());
+        input.faults.0.push(fault);
+    }
     outputs.spare(&input.files)?;
     arguments.solve.refuse_tiny_elements(&input.mesh)?;
     if let Some(density) = arguments.texels_per_metre {

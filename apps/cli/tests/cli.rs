@@ -416,6 +416,68 @@ const LAMP: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0
 "bufferViews":[{"buffer":0,"byteLength":36}],
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,0,1]}]}"#;
 
+/// The lit triangle as sheets of so many materials: the first is on it.
+fn sheets(materials: &[Value]) -> String {
+    let materials = serde_json::json!(materials).to_string();
+    let used = LAMP.replace(r#""POSITION":0}"#, r#""POSITION":0},"material":0"#);
+    used.replacen('{', &format!(r#"{{"materials":{materials},"#), 1)
+}
+
+/// A material that passes light by KHR_materials_diffuse_transmission, green.
+fn sheet(name: &str, base: f64, factor: f64, color: f64) -> Value {
+    serde_json::json!({ "name": name, "pbrMetallicRoughness": { "metallicFactor": 0, "baseColorFactor": [0, base, 0, 1] },
+        "extensions": { "KHR_materials_diffuse_transmission": {
+            "diffuseTransmissionFactor": factor, "diffuseTransmissionColorFactor": [0, color, 0] } } })
+}
+
+#[test]
+fn catalogue_12_check_refuses_what_gives_back_more_than_it_gets() {
+    let room = Room::new("check-sheets");
+    room.write(
+        "bright.gltf",
+        &sheets(&[sheet("silk", 0.9, 0.5, 1.3), sheet("fine", 0.9, 0.5, 0.9), sheet("net", 0.8, 2.0, 0.5)]),
+    );
+    let run = room.run(["check", "bright.gltf", "--json"]);
+    assert_eq!(run.code, Some(2), "{run:?}");
+    let faults = run.events()[0]["faults"].as_array().unwrap().clone();
+    let errors: Vec<[&str; 2]> = faults
+        .iter()
+        .filter(|fault| fault["severity"] == "error")
+        .map(|fault| ["place", "what"].map(|key| fault[key].as_str().unwrap()))
+        .collect();
+    assert_eq!(errors.len(), 2, "{faults:?}");
+    assert!(
+        errors[0][0] == "bright.gltf: materials[0] 'silk'" && errors[0][1].contains("sum to [0.0, 1."),
+        "{errors:?}"
+    );
+    assert!(errors[1][0].contains("'net'") && errors[1][1].contains("place of 2 of"), "{errors:?}");
+    let bake = room.run(["bake", "bright.gltf", "-o", "lit.glb"]);
+    assert!(bake.code == Some(2) && bake.err.contains("'silk'") && bake.err.contains("'net'"), "{bake:?}");
+}
+
+/// A curtain in a lightmap looks as if nothing came through.
+#[test]
+fn catalogue_13_bake_says_what_a_lit_model_does_not_show_of_sheets() {
+    let room = Room::new("bake-sheets");
+    room.write("sheet.gltf", &sheets(&[sheet("silk", 0.9, 0.5, 0.9)]));
+    let call = ["bake", "sheet.gltf", "-o", "lit.glb", "--vertices", "--report", "r.json", "--error", "20%"];
+    let run = room.run(call);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let told = run.err.lines().find(|line| line.starts_with("warning: sheet.gltf: light passes through '"));
+    assert!(told.is_some_and(|line| line.contains("(shade a side by (ρ E + τ E')/π")), "{run:?}");
+    let report: Value = serde_json::from_slice(&room.read("r.json")).unwrap();
+    let faults = report["faults"].as_array().unwrap();
+    assert!(faults.iter().any(|fault| fault["what"].as_str().unwrap().contains("light passes through")), "{faults:?}");
+    // Read again, its two layers are one sheet.
+    let lit = room.run(["check", "lit.glb", "--json"]).result();
+    let transmittance = lit["materials"][0]["transmittance"][1].as_f64().unwrap();
+    assert!(lit["area"] == 0.5 && (transmittance - 0.45).abs() < 1e-6, "{lit}");
+    let opaque = sheet("silk", 0.9, 0.0, 0.9);
+    room.write("plain.gltf", &sheets(&[opaque]));
+    let run = room.run(["bake", "plain.gltf", "-o", "plain.glb", "--vertices", "--error", "20%"]);
+    assert!(run.code == Some(0) && !run.err.contains("light passes"), "{run:?}");
+}
+
 #[test]
 fn bake_writes_model_picture_and_reports() {
     let room = Room::new("bake");

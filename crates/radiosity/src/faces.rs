@@ -31,7 +31,8 @@ impl Face {
     }
 }
 
-/// The faces that carry light: every front, and backs of double-sided objects that are not the inside of a solid.
+/// The faces that carry light: every front, and backs of double-sided objects that are not the inside of a solid. Both
+/// sides of a sheet that transmits light, for the light of the one leaves the other.
 pub(crate) fn faces(solution: &Solution) -> Vec<Face> {
     let (scene, mesh) = (solution.tracer().scene, solution.tracer().mesh);
     let mut flux = vec![[0f64; 2]; scene.objects.len()];
@@ -45,10 +46,11 @@ pub(crate) fn faces(solution: &Solution) -> Vec<Face> {
     for triangle in 0..mesh.triangles.len() {
         let object = scene.triangle_object[mesh.source[triangle] as usize] as usize;
         let [front, back] = flux[object];
-        if !solution.elements.has(triangle, Side::Back) || front >= FORGOTTEN_SIDE * back {
+        let transmits = scene.materials[scene.objects[object].material].transmits();
+        if transmits || !solution.elements.has(triangle, Side::Back) || front >= FORGOTTEN_SIDE * back {
             faces.push(Face { triangle, side: Side::Front, object });
         }
-        if solution.elements.has(triangle, Side::Back) && back > FORGOTTEN_SIDE * front {
+        if solution.elements.has(triangle, Side::Back) && (transmits || back > FORGOTTEN_SIDE * front) {
             faces.push(Face { triangle, side: Side::Back, object });
         }
     }

@@ -2,6 +2,7 @@
 
 mod flipped;
 mod overlap;
+pub mod sheets;
 
 use radiosity::{Faults, Mesh, PointLight, Scene, counted};
 use std::collections::HashMap;
