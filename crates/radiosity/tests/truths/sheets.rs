@@ -96,9 +96,9 @@ fn assert_passes(found: [[f64; 3]; 4], within: f64, who: &str) {
 #[test]
 fn catalogue_12_a_pane_passes_its_transmittance_by_form_factors() {
     let scene = lit_and_dark();
-    for (method, within) in [("adaptive", 1e-3), ("hemicube", 4e-2), ("hemisphere", 2e-2)] {
+    for (method, size, within) in [("adaptive", 0.5, 1e-6), ("hemicube", 0.75, 3e-2), ("hemisphere", 1.0, 5e-3)] {
         let form_factors: Option<FormFactorMethod> = Some(method.parse().unwrap());
-        let options = SolveOptions { element_size: Some(0.5), rays: 32, form_factors, ..SolveOptions::default() };
+        let options = SolveOptions { element_size: Some(size), rays: 32, form_factors, ..SolveOptions::default() };
         assert_passes(exchanged(&scene, &options), within, method);
     }
 }
@@ -206,7 +206,9 @@ fn catalogue_13_a_lamp_in_a_box_of_opal() {
     let exact = 4.0 * PI * 100.0 * f64::from(tau / (1.0 - rho));
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
-    let baked = bake(&tracer, &BakeOptions { error: 0.03, ..BakeOptions::default() }, &()).unwrap();
+    let solve = SolveOptions { element_size: Some(0.2), ..SolveOptions::default() };
+    let options = BakeOptions { error: 0.05, audit_points: 300, solve, ..BakeOptions::default() };
+    let baked = bake(&tracer, &options, &()).unwrap();
     assert!(baked.achieved, "{:?}", baked.audit);
     let solution = &baked.solution;
     let mut flux = 0.0;
@@ -247,13 +249,30 @@ fn furnished(pane: Material) -> Scene {
     scene
 }
 
-/// Between rooms that reflect: points, texels, vertices and a picture, each audited by the path tracer, and the matrix.
+/// Luminance of the square around the middle of the pane that a picture shows from the second room, by the path tracer.
+fn leaving(referee: &Referee, half: f64) -> f64 {
+    let (mut sum, n) = (0.0, 32);
+    for i in 0..n * n {
+        let at = |k: i32| 0.5 + half * (2.0 * (f64::from(k) + 0.5) / f64::from(n) - 1.0);
+        let point = DVec3::new(1.0, at(i % n), at(i / n));
+        let on = |normal: DVec3| {
+            referee.irradiance(&Place { point: point + 1e-5 * normal, normal, triangle: u32::MAX }, 64, i as u64)
+        };
+        let (behind, here) = (on(-DVec3::X), on(DVec3::X));
+        sum += f64::from(luminance(std::array::from_fn(|k| RHO[k] * here[k] + TAU[k] * behind[k]))) / PI;
+    }
+    sum / f64::from(n * n)
+}
+
+/// Between rooms that reflect: points, texels and a picture, each audited by the path tracer, and the matrix.
 #[test]
 fn catalogue_13_rooms_joined_by_a_pane_agree_with_the_path_tracer() {
     let scene = furnished(opal(RHO, TAU));
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
-    let baked = bake(&tracer, &BakeOptions { error: 0.02, ..BakeOptions::default() }, &()).unwrap();
+    let solve = SolveOptions { element_size: Some(0.1), ..SolveOptions::default() };
+    let options = BakeOptions { error: 0.02, audit_points: 300, solve, ..BakeOptions::default() };
+    let baked = bake(&tracer, &options, &()).unwrap();
     assert!(baked.achieved && baked.audit.bias.abs() < 0.01, "{:?}", baked.audit);
     let balance = baked.solution.balance();
     assert!(balance.defect.iter().all(|d| d.abs() < 0.01), "{balance:?}");
@@ -265,16 +284,9 @@ fn catalogue_13_rooms_joined_by_a_pane_agree_with_the_path_tracer() {
             (DVec3::new(1.0 + at(7), at(11), 0.0), DVec3::Z)
         })
         .collect();
-    let measured = measure(&tracer, &dark, &MeasureOptions { error: 0.02, ..MeasureOptions::default() }, &()).unwrap();
-    assert!(measured.achieved, "{:?}", measured.audit);
-    let referee = Referee::new(&tracer);
-    let (mut engine, mut traced) = (0.0, 0.0);
-    for (i, ((point, normal), h)) in dark.iter().zip(&measured.irradiance).enumerate() {
-        let place = Place { point: *point, normal: *normal, triangle: u32::MAX };
-        engine += f64::from(luminance(*h));
-        traced += f64::from(luminance(referee.irradiance(&place, 2048, i as u64)));
-    }
-    assert!((engine / traced - 1.0).abs() < 0.01, "{engine} for {traced}");
+    let options = MeasureOptions { error: 0.03, solve, ..MeasureOptions::default() };
+    let measured = measure(&tracer, &dark, &options, &()).unwrap();
+    assert!(measured.achieved && measured.audit.bias.abs() < 0.01, "{:?}", measured.audit);
 
     // Factors of a matrix tell the same of the dark room.
     let mean = |options: &SolveOptions| {
@@ -283,8 +295,8 @@ fn catalogue_13_rooms_joined_by_a_pane_agree_with_the_path_tracer() {
     };
     let options = SolveOptions { element_size: Some(0.34), rays: 256, ..SolveOptions::default() };
     let by_rays = mean(&options);
-    let by_matrix = mean(&SolveOptions { form_factors: Some("hemisphere".parse().unwrap()), ..options });
-    assert!((by_rays / by_matrix - 1.0).abs() < 0.03, "{by_rays} and {by_matrix}");
+    let by_matrix = mean(&SolveOptions { form_factors: Some("adaptive".parse().unwrap()), ..options });
+    assert!((by_rays / by_matrix - 1.0).abs() < 0.01, "{by_rays} and {by_matrix}");
 
     // A picture of the pane from the dark room: what is behind it is evaluated and audited with it.
     let camera = Camera::look_at("eye", DVec3::new(1.9, 0.5, 0.5), DVec3::new(1.0, 0.5, 0.5), DVec3::Z, 0.5);
@@ -293,20 +305,8 @@ fn catalogue_13_rooms_joined_by_a_pane_agree_with_the_path_tracer() {
     let audit = view.audit(&baked, &()).unwrap();
     assert!(audit.error < 0.03, "{audit:?}");
     let shown: f64 = view.picture.pixels.iter().map(|p| f64::from(luminance(*p))).sum::<f64>() / 1024.0;
-    // The light that leaves the pane where the picture shows it, by the path tracer.
-    let (mut left, n) = (0.0, 32);
-    let half = 0.9 * 0.25f64.tan();
-    for i in 0..n * n {
-        let at = |k: i32| 0.5 + half * (2.0 * (f64::from(k) + 0.5) / f64::from(n) - 1.0);
-        let point = DVec3::new(1.0, at(i % n), at(i / n));
-        let on = |normal: DVec3| {
-            referee.irradiance(&Place { point: point + 1e-5 * normal, normal, triangle: u32::MAX }, 64, i as u64)
-        };
-        let (behind, here) = (on(-DVec3::X), on(DVec3::X));
-        left += f64::from(luminance(std::array::from_fn(|k| RHO[k] * here[k] + TAU[k] * behind[k]))) / PI;
-    }
-    let left = left / f64::from(n * n);
-    assert!((shown / left - 1.0).abs() < 0.015, "{shown} for {left}");
+    let left = leaving(&Referee::new(&tracer), 0.9 * 0.25f64.tan());
+    assert!((shown / left - 1.0).abs() < 0.01, "{shown} for {left}");
 
     let map = lightmap(&baked, Some(20.0), 4096, &()).unwrap();
     assert!(map.audit.error < 0.04, "{:?}", map.audit);
@@ -323,14 +323,34 @@ fn catalogue_13_a_pane_that_passes_nothing_is_a_wall() {
             let tracer = Tracer::new(&scene, &mesh);
             let points: Vec<(DVec3, DVec3)> =
                 [0.2, 0.7].into_iter().map(|x| (DVec3::new(x, 0.4, 0.0), DVec3::Z)).collect();
-            let measured = measure(&tracer, &points, &MeasureOptions::default(), &()).unwrap();
-            let options = SolveOptions { element_size: Some(0.2), rays: 64, ..SolveOptions::default() };
-            let solution = Solution::new(&tracer, &options, &()).unwrap();
+            let solve = SolveOptions { element_size: Some(0.2), rays: 64, ..SolveOptions::default() };
+            let options = MeasureOptions { error: 0.1, solve, ..MeasureOptions::default() };
+            let measured = measure(&tracer, &points, &options, &()).unwrap();
+            let solution = Solution::new(&tracer, &solve, &()).unwrap();
             let bits = |bands: &[[f32; 3]]| bands.iter().flatten().map(|h| h.to_bits()).collect::<Vec<_>>();
             let dark = solution.irradiance().iter().filter(|h| **h == [0.0; 3]).count();
-            (bits(solution.irradiance()), bits(&measured.irradiance), measured.audit.error.to_bits(), dark)
+            (bits(solution.irradiance()), bits(&measured.irradiance), measured.audit.upper.to_bits(), dark)
         })
         .collect();
     assert!(answers[0] == answers[1]);
     assert!(answers[0].3 > 0, "the second room is dark");
+}
+
+/// Of a globe or a blind, the side in the dark was left out as the inside of a solid is, and seen from there it was gone.
+#[test]
+fn a_sheet_is_written_on_both_sides_though_one_is_dark() {
+    for (pane, layers) in [(opal(RHO, TAU), 2), (Material { double_sided: true, ..Material::default() }, 1)] {
+        let mut scene = lit_and_dark();
+        scene.materials[2] = pane;
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let solve = SolveOptions { element_size: Some(0.5), rays: 32, ..SolveOptions::default() };
+        let options = BakeOptions { error: 0.5, rounds: 0, audit_points: 100, solve, ..BakeOptions::default() };
+        let baked = bake(&tracer, &options, &()).unwrap();
+        let light = vertex_light(&baked, &()).unwrap();
+        let name = |object: usize| scene.objects[object].name.as_str();
+        let written: Vec<bool> =
+            light.primitives.iter().filter(|p| name(p.object) == "pane").map(|p| p.flipped).collect();
+        assert_eq!(written, [false, true][..layers]);
+    }
 }
