@@ -49,16 +49,16 @@ pub fn point_to_triangle(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> f6
 fn around(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     let Some(last) = corners.last() else { return 0.0 };
     let mut sum = 0.0;
-    let (mut set, mut risen): (Option<DVec3>, Option<DVec3>) = (None, None);
-    let mut a = *last - point;
-    let mut height_a = a.dot(normal);
+    let (mut set, mut risen): (Option<Corner>, Option<Corner>) = (None, None);
+    let mut a = Corner::new(*last - point);
+    let mut height_a = a.to.dot(normal);
     for corner in corners {
-        let b = *corner - point;
-        let height_b = b.dot(normal);
+        let b = Corner::new(*corner - point);
+        let height_b = b.to.dot(normal);
         if height_a >= 0.0 && height_b >= 0.0 {
             sum += contour(a, b, normal);
         } else if height_a >= 0.0 || height_b >= 0.0 {
-            let c = a + height_a / (height_a - height_b) * (b - a);
+            let c = Corner::new(a.to + height_a / (height_a - height_b) * (b.to - a.to));
             if height_a >= 0.0 {
                 sum += contour(a, c, normal);
                 set = Some(c);
@@ -83,23 +83,76 @@ fn around(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
 #[inline]
 pub(crate) fn point_to_polygon_above(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     let mut sum = 0.0;
-    let mut a = corners[corners.len() - 1] - point;
+    let mut a = Corner::new(corners[corners.len() - 1] - point);
     for corner in corners {
-        let b = *corner - point;
+        let b = Corner::new(*corner - point);
         sum += contour(a, b, normal);
         a = b;
     }
     (sum / std::f64::consts::TAU).max(0.0)
 }
 
-/// Γ · n of the edge from a to b, relative to the receiver. The corners of an emitter run counter-clockwise seen from the
-/// receiver, so Γ points away from the normal; hence the order b × a.
-#[inline]
-fn contour(a: DVec3, b: DVec3, normal: DVec3) -> f64 {
-    let cross = b.cross(a);
-    let sine = cross.length();
-    if sine > 0.0 { sine.atan2(a.dot(b)) / sine * cross.dot(normal) } else { 0.0 }
+/// A corner relative to the receiver.
+#[derive(Clone, Copy)]
+struct Corner {
+    to: DVec3,
+    /// Of its distance.
+    inverse: f64,
 }
+
+impl Corner {
+    #[inline]
+    fn new(to: DVec3) -> Corner {
+        let length = to.length();
+        Corner { to, inverse: if length > 0.0 { 1.0 / length } else { 0.0 } }
+    }
+}
+
+/// Γ · n of the edge from a to b. The corners of an emitter run counter-clockwise seen from the receiver, so Γ points
+/// away from the normal; hence the order b × a.
+#[inline]
+fn contour(a: Corner, b: Corner, normal: DVec3) -> f64 {
+    let cross = b.to.cross(a.to);
+    let inverse = a.inverse * b.inverse;
+    let cosine = a.to.dot(b.to) * inverse;
+    if cosine >= 0.0 {
+        return angle_over_sine(cosine) * inverse * cross.dot(normal);
+    }
+    // Of an obtuse angle by its supplement; an edge through the receiver or its continuation turns nothing.
+    let sine = cross.length();
+    let over = std::f64::consts::PI / sine - angle_over_sine(-cosine) * inverse;
+    if sine > 0.0 { over * cross.dot(normal) } else { 0.0 }
+}
+
+/// θ/sin θ by its cosine from 0 to 1. It is smooth there, and a quotient of polynomials of degree six that meets it at the
+/// 13 Chebyshev nodes is off by 6·10⁻¹⁷ of it; as all coefficients are positive, rounding adds no more than 5·10⁻¹⁶.
+#[inline]
+fn angle_over_sine(cosine: f64) -> f64 {
+    let horner = |of: &[f64; 7]| of.iter().rev().fold(0.0, |sum, c| sum * cosine + c);
+    horner(&ABOVE) / horner(&BELOW)
+}
+
+/// Coefficients of the numerator, ascending.
+const ABOVE: [f64; 7] = [
+    std::f64::consts::FRAC_PI_2,
+    3.771424387905608,
+    3.257899236511664,
+    1.2243394185020005,
+    0.19051684381249967,
+    0.009188301638923485,
+    2.6897910831215643e-5,
+];
+
+/// And of the denominator.
+const BELOW: [f64; 7] = [
+    1.0,
+    3.037583107697575,
+    3.5078285369157536,
+    1.9182133142852882,
+    0.5027353561831069,
+    0.0559996120488944,
+    0.0018314859458057275,
+];
 
 /// A point of a spherical triangle, uniform by solid angle (Arvo 1995, "Stratified sampling of spherical triangles").
 #[derive(Clone, Copy, Debug)]
@@ -195,6 +248,28 @@ fn linear(x: f64, a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// θ/sin θ from the quotient, against that of the functions where those lose nothing.
+    #[test]
+    fn angles_over_their_sines_are_exact() {
+        for k in 0..=1000 {
+            let angle = 0.5 * std::f64::consts::PI * f64::from(k) / 1000.0;
+            let exact = if k == 0 { 1.0 } else { angle / angle.sin() };
+            let found = angle_over_sine(angle.cos());
+            assert!((found - exact).abs() < 4.0 * f64::EPSILON * exact, "{angle}: {found} {exact}");
+        }
+    }
+
+    /// Receivers on an edge, its continuation or a corner: nothing that is not a number.
+    #[test]
+    fn edges_through_the_receiver_turn_nothing() {
+        let p = |x: f64, z: f64| DVec3::new(x, 0.0, z);
+        let corners = [p(-1., 0.), p(-1., 1.), p(1., 1.), p(1., 0.)];
+        for x in [-2.0, -1.0, 0.0, 0.5, 1.0, 3.0] {
+            let found = point_to_polygon(DVec3::new(x, 0.0, 0.0), DVec3::Z, &corners);
+            assert!(found.is_finite(), "{x}: {found}");
+        }
+    }
 
     fn unit_square_above(height: f64) -> [[DVec3; 3]; 2] {
         // Faces down, over the first quadrant.
