@@ -189,8 +189,8 @@ fn the_repair_moves_what_is_uncertain() {
     }
 }
 
-/// Floor under a turned block that stands on it, up to the corner of the block, sees nothing of what is outside: walls of
-/// triangles, as a mesh has them, hide it together.
+/// Floor under a turned block that stands on it, up to the corner of the block, sees nothing of what is outside: walls
+/// of triangles, as a mesh has them, hide it together.
 #[test]
 fn floor_under_a_block_is_hidden() {
     let corners = [[0.265, 0.296], [0.423, 0.247], [0.472, 0.406], [0.314, 0.456]];
@@ -221,7 +221,8 @@ fn floor_under_a_block_is_hidden() {
     assert!(factor.value <= factor.error && factor.error <= 1e-5, "{factor:?}");
 }
 
-/// A screen whose shadow lies between the places that are looked at first: found, and stated as an error where it is not.
+/// A screen whose shadow lies between the places that are looked at first: found, and stated as an error where it is
+/// not.
 #[test]
 fn a_small_shadow_is_not_overlooked() {
     let mut scene = Enclosure::default();
@@ -236,13 +237,13 @@ fn a_small_shadow_is_not_overlooked() {
     }
 }
 
-/// Sheets that stand at random and go through one another: what is stated as the error holds what is, but for one in fifty,
-/// and those are not far off.
+/// Sheets that stand at random and go through one another: what is stated as the error holds what is, but for one in
+/// fifty, and those are not far off.
 #[test]
 fn stated_errors_hold_among_random_sheets() {
     let mut random = Random::new(11);
     let mut ratios: Vec<f64> = Vec::new();
-    for _ in 0..6 {
+    for _ in 0..12 {
         let mut scene = Enclosure::default();
         for k in 0..6 {
             let mut vector = |size: f64| DVec3::from_array(std::array::from_fn(|_| size * random.next_unit()));
@@ -268,7 +269,7 @@ fn stated_errors_hold_among_random_sheets() {
     }
     ratios.sort_by(f64::total_cmp);
     let [at_98, most] = [ratios[ratios.len() * 98 / 100], ratios[ratios.len() - 1]];
-    assert!(ratios.len() > 80 && at_98 <= 1.0 && most < 10.0, "{} pairs: {at_98}, {most}", ratios.len());
+    assert!(ratios.len() > 150 && at_98 <= 1.0 && most < 10.0, "{} pairs: {at_98}, {most}", ratios.len());
 }
 
 /// What is asked of surfaces holds for them, though they have several facets that take part.
@@ -317,7 +318,8 @@ fn rooms_on_either_side_of_a_wall_are_closed() {
     }
 }
 
-/// Many staggered plates between two squares: what they leave is found without going through all ways in which they overlap.
+/// Many staggered plates between two squares: what they leave is found without going through all ways in which they
+/// overlap.
 #[test]
 fn many_plates_that_overlap_are_one_shadow() {
     let plate = |x: f64, z: f64| facet(&[[x, -0.1, z], [x + 0.3, -0.1, z], [x + 0.3, 0.7, z], [x, 0.7, z]]);

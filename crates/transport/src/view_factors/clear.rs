@@ -1,12 +1,14 @@
 //! Pairs with nothing between them: cubature where they are far apart, the closed form where they are not.
 //!
-//! A_i F_ij = ∫∫ cos θ_i cos θ_j/(π r²) dA_j dA_i by products of Gauss rules of order n on either part. Their error falls
-//! as (R/r)^2n with the radius R of the larger part and the distance r of the centres; which n, or the closed form,
-//! is decided pair by pair by what this leaves of the accuracy asked.
+//! A_i F_ij = ∫∫ cos θ_i cos θ_j/(π r²) dA_j dA_i by products of Gauss rules of order n on either part. Their error
+//! falls as (R/r)^2n with the radius R of the larger part and the distance r of the centres; which n, or the closed
+//! form, is decided pair by pair by what this leaves of the accuracy asked.
 
-use super::part::{ORDERS, Part};
+use super::frame::{Frame, ORDERS, Weighted};
+use super::part::Part;
 use crate::pair::exact::exact;
 use glam::DVec3;
+use radiosity_scene::Facet;
 
 /// An exchange area A_i F_ij, m², and a bound of its error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,31 +35,73 @@ pub type Order = usize;
 /// A_i F_ij of two parts that see each other whole where they face each other at all; `tolerance` in m². `cut` says
 /// that one reaches behind the other's plane.
 pub fn clear(a: &Part, b: &Part, tolerance: f64, cut: bool) -> (Exchange, Order) {
-    let between = b.shape.centroid() - a.shape.centroid();
-    let squared = between.length_squared();
-    let radius = a.radius.max(b.radius);
-    let ratio = radius * radius / squared;
-    if !cut && ratio < NEAREST * NEAREST {
-        let mut bound = a.shape.area() * b.shape.area() / (std::f64::consts::PI * squared);
-        for order in 1..=ORDERS {
-            bound *= ratio;
-            let error = CONSTANT[order - 1] * bound;
-            if error <= tolerance {
-                return (Exchange { value: cubature(a, b, order), error }, order);
-            }
+    let bounds = Bounds {
+        radius: a.radius.max(b.radius),
+        squared: a.shape.centroid().distance_squared(b.shape.centroid()),
+        areas: [a.shape.area(), b.shape.area()],
+    };
+    match bounds.order(tolerance).filter(|_| !cut) {
+        Some((order, error)) => {
+            let normals = [a.shape.normal(), b.shape.normal()];
+            (Exchange { value: cubature(a.rule(order), b.rule(order), normals), error }, order)
         }
+        None => (closed_form(&a.shape, &b.shape), 0),
     }
-    let value = exact(&a.shape, &b.shape);
-    let [relative, absolute] = CLOSED_FORM;
-    (Exchange { value, error: relative * value + absolute * a.shape.area().min(b.shape.area()) }, 0)
 }
 
-/// The product rule of an order.
-fn cubature(a: &Part, b: &Part, order: usize) -> f64 {
-    let (n_a, n_b) = (a.shape.normal(), b.shape.normal());
-    let to = b.rule(order);
+/// The same of a frame with unit `normal` and a part.
+pub fn clear_frame(frame: &Frame, normal: DVec3, b: &Part, tolerance: f64) -> Exchange {
+    let centre = frame.centre();
+    let bounds = Bounds {
+        radius: frame.corners().iter().map(|c| c.distance(centre)).fold(b.radius, f64::max),
+        squared: centre.distance_squared(b.shape.centroid()),
+        areas: [frame.area(), b.shape.area()],
+    };
+    match bounds.order(tolerance) {
+        Some((order, error)) => {
+            let value = cubature(&frame.rule(order), b.rule(order), [normal, b.shape.normal()]);
+            Exchange { value, error }
+        }
+        None => Facet::new(frame.corners().to_vec()).map_or(Exchange::default(), |shape| closed_form(&shape, &b.shape)),
+    }
+}
+
+/// The closed form, whatever faces what.
+pub fn closed_form(a: &Facet, b: &Facet) -> Exchange {
+    let value = exact(a, b);
+    let [relative, absolute] = CLOSED_FORM;
+    Exchange { value, error: relative * value + absolute * a.area().min(b.area()) }
+}
+
+/// What the errors of rules go by.
+struct Bounds {
+    /// Radius of the larger.
+    radius: f64,
+    /// Distance of the centres, squared.
+    squared: f64,
+    areas: [f64; 2],
+}
+
+impl Bounds {
+    /// The least order that meets a tolerance (m²), and the bound of its error.
+    fn order(&self, tolerance: f64) -> Option<(Order, f64)> {
+        let ratio = self.radius * self.radius / self.squared;
+        if ratio >= NEAREST * NEAREST {
+            return None;
+        }
+        let mut bound = self.areas[0] * self.areas[1] / (std::f64::consts::PI * self.squared);
+        (1..=ORDERS).find_map(|order| {
+            bound *= ratio;
+            let error = CONSTANT[order - 1] * bound;
+            (error <= tolerance).then_some((order, error))
+        })
+    }
+}
+
+/// The product of two rules.
+fn cubature(from: &[Weighted], to: &[Weighted], [n_a, n_b]: [DVec3; 2]) -> f64 {
     let mut sum = 0.0;
-    for &[x, y, z, w] in a.rule(order) {
+    for &[x, y, z, w] in from {
         let from = DVec3::new(x, y, z);
         let mut inner = 0.0;
         for &[x, y, z, w] in to {
@@ -73,7 +117,6 @@ fn cubature(a: &Part, b: &Part, order: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use radiosity_scene::Facet;
     use radiosity_trace::sampling::Random;
 
     /// Random parallelograms and triangles, about a tenth of them as flat as slats.
@@ -106,9 +149,10 @@ mod tests {
             let squared = a.shape.centroid().distance_squared(b.shape.centroid());
             let mut bound = a.shape.area() * b.shape.area() / (std::f64::consts::PI * squared);
             let value = exact(&a.shape, &b.shape);
+            let normals = [a.shape.normal(), b.shape.normal()];
             for order in 1..=ORDERS {
                 bound *= radius * radius / squared;
-                let off = (cubature(&a, &b, order) - value).abs() - CLOSED_FORM[0] * value;
+                let off = (cubature(a.rule(order), b.rule(order), normals) - value).abs() - CLOSED_FORM[0] * value;
                 worst[order - 1] = worst[order - 1].max(off / bound);
             }
         }

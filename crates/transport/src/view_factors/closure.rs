@@ -1,10 +1,11 @@
 //! Closure: how far rows are from summing to one, and a repair that moves uncertain entries and no others.
 //!
 //! In a closed enclosure Σ_j F_ij = 1. The repair is the least change that makes it so: Σ (ΔS_ij/σ_ij)² is least under
-//! Σ_j S_ij = A_i, where S is the symmetric exchange area and σ its error (van Leersum 1989, "A method for determining a
-//! consistent set of radiation view factors", with errors for weights). Its solution is ΔS_ij = σ_ij² (λ_i + λ_j); the
-//! multipliers λ come from a symmetric system, by conjugate gradients. Entries stay at or above zero and within twice their
-//! stated errors. What is certain does not move, so a gap in the enclosure does not close: the defect that is left is reported.
+//! Σ_j S_ij = A_i, where S is the symmetric exchange area and σ its error (van Leersum 1989, "A method for determining
+//! a consistent set of radiation view factors", with errors for weights). Its solution is ΔS_ij = σ_ij² (λ_i + λ_j);
+//! the multipliers λ come from a symmetric system, by conjugate gradients. Entries stay at or above zero and within
+//! twice their stated errors. What is certain does not move, so a gap in the enclosure does not close: the defect that
+//! is left is reported.
 
 use super::ViewFactors;
 use serde::Serialize;
@@ -49,8 +50,8 @@ pub struct Repair {
     pub after: Closure,
     /// Largest change of a factor.
     pub largest_change: f64,
-    /// Largest change relative to the entry's stated error: where it is as large as is allowed, two, the enclosure is not
-    /// closed, or errors were stated too small.
+    /// Largest change relative to the entry's stated error: where it is as large as is allowed, two, the enclosure is
+    /// not closed, or errors were stated too small.
     pub largest_relative: f64,
     /// Rows that lack more than their errors allow, where the enclosure has a gap; they stay as they are.
     pub open_rows: usize,
@@ -135,7 +136,8 @@ impl ViewFactors {
         lacks.zip(reach).map(|(lacks, reach)| lacks > reach).collect()
     }
 
-    /// λ of Σ_j w_ij (λ_i + λ_j) = off_i, zero on open rows, by conjugate gradients with the diagonal as preconditioner.
+    /// λ of Σ_j w_ij (λ_i + λ_j) = off_i, zero on open rows, by conjugate gradients with the diagonal as
+    /// preconditioner.
     fn multipliers(&self, weights: &[f64], off: &[f64], is_open: &[bool]) -> Vec<f64> {
         let n = self.len();
         let apply = |x: &[f64]| {

@@ -1,24 +1,35 @@
 //! Pairs with something between them: the form factor of what is visible, exact from each point of one part, averaged
 //! over its points.
 //!
-//! From a point, panels are cut out of the other part exactly, so shadow edges on it cost nothing. Over the points the
-//! visible factor is continuous with kinks, and cells are divided where it bends. The part that lies farther from the
-//! panels, by its own size, is divided: what stands close to a part throws sharp shadows there, which only the exact
-//! side resolves.
+//! From a point, bodies are cut out of the other part exactly, so shadow edges on it cost nothing. Over the points the
+//! visible factor is continuous with kinks: the part is cut along them (`sides`), and cells are divided where it still
+//! bends (`cell`, `adaptive`). The part that lies farther from the panels, by its own size, is divided: what stands
+//! close to a part throws sharp shadows there, which only the exact side resolves.
 
-use super::adaptive::{Before, List, Shaded, integrate};
-use super::clear::Exchange;
+use super::adaptive::integrate;
+use super::body::{Body, Occluder, Setting};
+use super::cell::{List, Shaded};
+use super::clear::{Exchange, clear_frame, closed_form};
+use super::frame::Frame;
 use super::panel::Panel;
 use super::part::Part;
 use super::shaft::{Look, Shaft, Stands};
-use super::solid::{Obstacles, hides, looks_away};
+use super::sides::{Sides, sides};
+use super::solid::{Obstacles, looks_away};
 use super::visible::{Loop, Shadows, Sight, keep_above, lambert};
-use crate::pair::exact::exact;
 use glam::DVec3;
 use radiosity_scene::Facet;
+use smallvec::SmallVec;
 
 /// Places are drawn this much towards the middle: on an edge that both parts share, a factor has no one value.
 const INSIDE: f64 = 1e-7;
+
+/// Least height of a corner above the other polygon's plane, by the greatest: below it, all that reaches the corner
+/// changes too fast for places to tell.
+const STEEP: f64 = 1e-3;
+
+/// Error of visible and hidden together over all cells, relative to the tolerance.
+const OF_WHOLE: f64 = 0.01;
 
 /// A_i F_ij of two parts past panels; `tolerance` and the answer in m², `whole` is the answer without panels.
 pub fn mixed(
@@ -41,20 +52,27 @@ pub fn mixed(
     let (Ok(from), Ok(to)) = (Facet::new(from.to_vec()), Facet::new(target.to_vec())) else { return unknown };
     panels.retain(|panel| !looks_away(panel, obstacles, from.corners(), touch));
     let Ok(count) = u16::try_from(panels.len()) else { return unknown };
-    let middle = from.centroid();
-    Shadows::sort(middle, outer.shape.normal(), &target, panels, touch);
+    let setting = Setting { panels, obstacles, target: &target, touch };
+    let (bodies, body_of) = Body::of(setting, from.corners());
+    let Sides { pieces, sides } = sides(from.corners(), outer.radius, &bodies, setting);
     let all: List = (0..count).collect();
-    let mut view =
-        View { shadows, panels, obstacles, middle, normal: outer.shape.normal(), target: &target, to: &to, touch };
-    let found = integrate(&from, (whole.value, tolerance), &mut view, &all);
-    // What is visible, or what all would be without what is hidden: whichever is known better.
-    let [(visible, of_visible), (hidden, of_hidden)] = [0, 1].map(|k| (found.values[k], found.errors[k]));
-    let (value, error) = if of_visible <= of_hidden + whole.error {
-        (visible, of_visible)
-    } else {
-        (whole.value - hidden, of_hidden + whole.error)
+    let is_whole = inner.shape.corners() == &target[..];
+    let mut view = View {
+        shadows,
+        panels,
+        body_of: &body_of,
+        sides: &sides,
+        from: from.corners(),
+        middle: from.centroid(),
+        normal: outer.shape.normal(),
+        target: &target,
+        to: &to,
+        inner: is_whole.then_some(inner),
+        of_whole: OF_WHOLE * tolerance / from.area(),
+        touch,
     };
-    Exchange { value: value.clamp(0.0, whole.value), error }
+    let found = integrate(&pieces, (whole.value, tolerance), &mut view, &all);
+    Exchange { value: found.value.clamp(0.0, whole.value), ..found }
 }
 
 /// How far the nearest panel stands from a part, by the part's size.
@@ -67,13 +85,21 @@ fn distance(part: &Part, panels: &[&Panel]) -> f64 {
 struct View<'a> {
     shadows: &'a mut Shadows,
     panels: &'a [&'a Panel],
-    obstacles: Obstacles<'a>,
+    /// The body that a panel belongs to.
+    body_of: &'a [u16],
+    /// Bodies as seen from each side.
+    sides: &'a [Vec<Option<Occluder>>],
     /// Where from.
+    from: &'a [DVec3],
     middle: DVec3,
     normal: DVec3,
     /// Where to.
     target: &'a [DVec3],
     to: &'a Facet,
+    /// The part that it is, if no corner of it was cut off.
+    inner: Option<&'a Part>,
+    /// Error of visible and hidden together over a cell, by its area.
+    of_whole: f64,
     touch: f64,
 }
 
@@ -81,41 +107,40 @@ impl View<'_> {
     fn shaft<'a>(&'a self, cell: &'a [DVec3]) -> Shaft<'a> {
         Shaft::new([cell, self.target], [self.normal, self.to.normal()], self.touch)
     }
+
+    fn inside(&self, place: DVec3) -> DVec3 {
+        place + INSIDE * (self.middle - place)
+    }
 }
 
 impl Shaded for View<'_> {
-    fn sight(&mut self, x: DVec3, list: &[u16]) -> Sight {
-        let x = x + INSIDE * (self.middle - x);
-        self.shadows.sight((x, self.normal), self.target, (self.panels, list), self.touch)
+    fn sight(&mut self, side: u16, place: DVec3, list: &[u16]) -> Sight {
+        let mut bodies: SmallVec<[u16; 16]> = list.iter().map(|k| self.body_of[*k as usize]).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        let side = &self.sides[side as usize];
+        let occluders = bodies.iter().filter_map(|k| side[*k as usize].as_ref().map(|o| (*k, o)));
+        self.shadows.sight((self.inside(place), self.normal), self.target, occluders, self.touch)
     }
 
-    fn before(&mut self, cell: &[DVec3], list: &[u16]) -> Before {
-        let mut left = List::new();
-        let mut shaft = self.shaft(cell);
-        for &k in list {
-            match shaft.stands(self.panels[k as usize], Look::Rough) {
-                Stands::Aside => {}
-                Stands::Between => left.push(k),
-                Stands::Across => return Before::All,
-            }
-        }
-        if left.is_empty() { Before::Nothing } else { Before::Some(left) }
+    fn all(&mut self, place: DVec3) -> f64 {
+        lambert(self.inside(place), self.normal, self.target)
     }
 
-    fn is_clear(&mut self, cell: &[DVec3], list: &[u16]) -> bool {
-        let mut shaft = self.shaft(cell);
+    fn before(&mut self, corners: &[DVec3], list: &[u16]) -> List {
+        let mut shaft = self.shaft(corners);
+        let stands = |k: &u16| shaft.stands(self.panels[*k as usize], Look::Rough) != Stands::Aside;
+        list.iter().copied().filter(stands).collect()
+    }
+
+    fn is_clear(&mut self, corners: &[DVec3], list: &[u16]) -> bool {
+        let mut shaft = self.shaft(corners);
         list.iter().all(|k| shaft.stands(self.panels[*k as usize], Look::Close) == Stands::Aside)
     }
 
-    fn is_hidden(&mut self, cell: &[DVec3], list: &[u16]) -> bool {
-        let mut solids: Vec<u32> = list.iter().filter_map(|k| self.panels[*k as usize].solid).collect();
-        solids.dedup();
-        solids.into_iter().any(|solid| hides(self.obstacles, solid, [cell, self.target]))
-    }
-
-    fn possible(&mut self, cell: &[DVec3], list: &[u16]) -> f64 {
-        let centre = cell.iter().sum::<DVec3>() / cell.len() as f64;
-        let mut shaft = self.shaft(cell);
+    fn possible(&mut self, corners: &[DVec3], list: &[u16]) -> f64 {
+        let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
+        let mut shaft = self.shaft(corners);
         let mut sum = 0.0;
         for &k in list {
             let panel = self.panels[k as usize];
@@ -130,7 +155,16 @@ impl Shaded for View<'_> {
         sum
     }
 
-    fn whole(&mut self, cell: &[DVec3]) -> f64 {
-        Facet::new(cell.to_vec()).map_or(0.0, |cell| exact(&cell, self.to))
+    fn whole(&mut self, cell: &Frame) -> Exchange {
+        match self.inner {
+            Some(inner) => clear_frame(cell, self.normal, inner, self.of_whole * cell.area()),
+            None => Facet::new(cell.corners().to_vec()).map_or(Exchange::default(), |cell| closed_form(&cell, self.to)),
+        }
+    }
+
+    fn is_steep(&self) -> bool {
+        let heights = self.from.iter().map(|x| self.to.height(*x));
+        let (low, high) = heights.fold((f64::INFINITY, 0.0f64), |(low, high), h| (low.min(h), high.max(h)));
+        low < STEEP * high
     }
 }

@@ -6,13 +6,17 @@
 //! of one is therefore an honest measure of the error, and is reported before any repair (`closure`).
 
 mod adaptive;
+mod body;
+mod cell;
 mod clear;
 mod closure;
 mod cluster;
+mod frame;
 mod mixed;
 mod panel;
 mod part;
 mod shaft;
+mod sides;
 mod solid;
 mod store;
 mod visible;
@@ -32,15 +36,15 @@ use radiosity_scene::{Enclosure, Facet};
 use rayon::prelude::*;
 use serde::Serialize;
 use shaft::{Look, Shaft, Stands};
-use solid::{Obstacles, find_solids};
+use solid::{Obstacles, Solid, find_solids};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use visible::Shadows;
 
 /// How exact the factors are to be, and what they may take.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFactorOptions {
-    /// Bound of the error of each F_ij between surfaces that see each other partly; of surfaces of many facets a bound of
-    /// what those are asked for.
+    /// Bound of the error of each F_ij between surfaces that see each other partly; of surfaces of many facets a bound
+    /// of what those are asked for.
     pub accuracy: f64,
     /// The same for those that see each other whole.
     pub clear_accuracy: f64,
@@ -121,7 +125,8 @@ const TOUCH: f64 = 5e-7;
 /// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
 const WHOLE: f64 = 0.05;
 
-/// Least share of the accuracy that a pair of facets is asked for, where surfaces have many: their errors hardly add up.
+/// Least share of the accuracy that a pair of facets is asked for, where surfaces have many: their errors hardly add
+/// up.
 const LEAST: f64 = 0.1;
 
 /// Bytes that a pair takes at most, while it is found and put in order.
@@ -189,7 +194,7 @@ struct Walk<'a> {
     areas: &'a [f64],
     clusters: &'a Clusters,
     panels: &'a [Panel],
-    solids: &'a [Vec<u32>],
+    solids: &'a [Solid],
     options: &'a ViewFactorOptions,
     touch: f64,
     shadows: Shadows,

@@ -168,8 +168,8 @@ pub fn panels(enclosure: &Enclosure, planes: &mut Planes) -> Vec<Panel> {
     panels
 }
 
-/// Drops corners that lie on the line between their neighbours, where facets met along a straight edge: rounding would make
-/// them corners of ever more pieces.
+/// Drops corners that lie on the line between their neighbours, where facets met along a straight edge: rounding would
+/// make them corners of ever more pieces.
 fn straighten(contour: &mut Vec<[f64; 2]>, touch: f64) {
     let mut k = 0;
     while contour.len() > 3 && k < contour.len() {

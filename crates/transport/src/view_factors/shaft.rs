@@ -97,7 +97,8 @@ impl<'a> Shaft<'a> {
             }
             all_within &= crossings.within;
         }
-        // What lies in the panel itself looks away from it: a polygon only touches it there, a box may hold whole parts.
+        // What lies in the panel itself looks away from it: a polygon only touches it there, a box may hold whole
+        // parts.
         let is_off = |end: usize, h: &Over| self.normals[end] != DVec3::ZERO || h.iter().all(|h| h.abs() > touch);
         if all_within && is_parted && is_off(0, &a) && is_off(1, &b) {
             return Stands::Across;

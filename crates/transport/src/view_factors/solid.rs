@@ -1,24 +1,35 @@
 //! Solids: panels that close around a convex body, normals outwards.
 //!
-//! Light that meets a body from outside meets a face that looks towards where it comes from. So of a body only the faces
-//! before a place need be looked at from there, half of them, unless the place lies within.
+//! Light that meets a body from outside meets a face that looks towards where it comes from. So of a body only the
+//! faces before a place need be looked at from there, half of them, unless the place lies within.
 
+use super::body::Line;
 use super::panel::Panel;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
+
+/// A convex body.
+#[derive(Clone, Debug, Default)]
+pub struct Solid {
+    /// Its faces, by index of the panel.
+    pub faces: Vec<u32>,
+    /// The edges of each face, counter-clockwise about its normal: the face, the one beyond, both ends.
+    pub edges: Vec<(u32, u32, Line)>,
+}
 
 /// The panels of a scene and its solids.
 #[derive(Clone, Copy)]
 pub struct Obstacles<'a> {
     /// All panels.
     pub panels: &'a [Panel],
-    /// The faces of each solid.
-    pub solids: &'a [Vec<u32>],
+    /// The convex bodies that some of them close around.
+    pub solids: &'a [Solid],
 }
 
 /// Marks the panels that are faces of convex solids; answers with the faces of each.
-pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Vec<u32>> {
-    // Corners within some roundings of each other are one; where a border of the grid parts them, a solid is overlooked.
+pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Solid> {
+    // Corners within some roundings of each other are one; where a border of the grid parts them, a solid is
+    // overlooked.
     let cell = 16.0 * touch;
     let key = |p: &DVec3| p.to_array().map(|x| (x / cell).round() as i64);
     let mut edges: FxHashMap<[[i64; 3]; 2], Vec<u32>> = FxHashMap::default();
@@ -35,9 +46,10 @@ pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Vec<u32>> {
             continue;
         }
         seen[start] = true;
-        let (mut faces, mut next, mut closed) = (vec![start as u32], 0, true);
+        let (mut faces, mut of_edges, mut next, mut closed) = (vec![start as u32], Vec::new(), 0, true);
         while next < faces.len() {
-            let panel = &panels[faces[next] as usize];
+            let face = faces[next];
+            let panel = &panels[face as usize];
             next += 1;
             for (i, a) in panel.corners.iter().enumerate() {
                 let b = &panel.corners[(i + 1) % panel.corners.len()];
@@ -45,6 +57,7 @@ pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Vec<u32>> {
                 let own = edges.get(&[key(a), key(b)]).map_or(0, Vec::len);
                 match edges.get(&[key(b), key(a)]).map(Vec::as_slice) {
                     Some([other]) if own == 1 => {
+                        of_edges.push((face, *other, Line::new([*a, *b])));
                         if !std::mem::replace(&mut seen[*other as usize], true) {
                             faces.push(*other);
                         }
@@ -61,7 +74,7 @@ pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Vec<u32>> {
             for face in &faces {
                 panels[*face as usize].solid = Some(solids.len() as u32);
             }
-            solids.push(faces);
+            solids.push(Solid { faces, edges: of_edges });
         }
     }
     solids
@@ -70,34 +83,17 @@ pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Vec<u32>> {
 /// Faces of a solid at most: finding out which are before a place must stay cheap.
 const MOST_FACES: usize = 32;
 
-/// Whether a solid's panel can be left out as seen from the places `from`: it looks away from them, and they lie outside.
+/// Whether a solid's panel can be left out as seen from the places `from`: it looks away from them, and they lie
+/// outside.
 pub fn looks_away(panel: &Panel, obstacles: Obstacles, from: &[DVec3], touch: f64) -> bool {
     let Some(solid) = panel.solid else { return false };
-    let is_before = |face: &u32| from.iter().all(|x| obstacles.panels[*face as usize].height(*x) >= -touch);
-    from.iter().all(|x| panel.height(*x) <= touch) && obstacles.solids[solid as usize].iter().any(is_before)
+    from.iter().all(|x| panel.height(*x) <= touch) && is_outside(solid, obstacles, from, touch)
 }
 
-/// Share of a segment that must lie within a solid: what starts on a face or passes an edge does not meet the body.
-const LEAST: f64 = 1e-9;
-
-/// Whether a solid stands between all points of two convex sets, which it does if it stands between all their corners: what
-/// a convex body hides from a point is convex, beyond the body and on either side alike.
-pub fn hides(obstacles: Obstacles, solid: u32, ends: [&[DVec3]; 2]) -> bool {
-    let faces = || obstacles.solids[solid as usize].iter().map(|face| &obstacles.panels[*face as usize]);
-    let meets = |p: DVec3, q: DVec3| {
-        let (mut first, mut last) = (0.0f64, 1.0f64);
-        for face in faces() {
-            let (h, k) = (face.height(p), face.height(q));
-            match (h > 0.0, k > 0.0) {
-                (true, true) => return false,
-                (true, false) => first = first.max(h / (h - k)),
-                (false, true) => last = last.min(h / (h - k)),
-                (false, false) => {}
-            }
-        }
-        first + LEAST < last
-    };
-    ends[0].iter().all(|p| ends[1].iter().all(|q| meets(*p, *q)))
+/// Whether places lie outside of a solid, all before one of its faces.
+pub fn is_outside(solid: u32, obstacles: Obstacles, places: &[DVec3], touch: f64) -> bool {
+    let is_before = |face: &u32| places.iter().all(|x| obstacles.panels[*face as usize].height(*x) >= -touch);
+    obstacles.solids[solid as usize].faces.iter().any(is_before)
 }
 
 #[cfg(test)]

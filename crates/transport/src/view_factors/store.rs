@@ -21,7 +21,8 @@ impl Entry {
     }
 }
 
-/// View factors between N facets (or surfaces), symmetric by storage: of A_i F_ij = A_j F_ji only i ≤ j is kept, by rows.
+/// View factors between N facets (or surfaces), symmetric by storage: of A_i F_ij = A_j F_ji only i ≤ j is kept, by
+/// rows.
 #[derive(Clone, Debug, Default)]
 pub struct ViewFactors {
     areas: Vec<f64>,

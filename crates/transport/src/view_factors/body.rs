@@ -1,0 +1,137 @@
+//! Bodies: what throws one convex shadow, a panel or a convex solid.
+//!
+//! From a place outside, a solid hides what lies beyond the faces that look towards the place and within the planes
+//! through the place and the edges where those faces meet the others: its outline. Over a piece of a polygon that no
+//! plane of a face crosses, these faces and edges are the same.
+
+use super::panel::Panel;
+use super::solid::{Obstacles, is_outside};
+use glam::DVec3;
+use smallvec::SmallVec;
+
+/// What stands before a convex polygon.
+#[derive(Clone, Copy)]
+pub struct Setting<'a> {
+    /// Panels that may hide a part.
+    pub panels: &'a [&'a Panel],
+    /// All panels, and the solids that they close around.
+    pub obstacles: Obstacles<'a>,
+    /// Corners of the polygon.
+    pub target: &'a [DVec3],
+    /// Distance below which points lie on a plane.
+    pub touch: f64,
+}
+
+/// Panels that throw one shadow, by their place in a list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Body {
+    /// A panel.
+    Panel(u16),
+    /// A solid.
+    Solid(u32),
+}
+
+impl Body {
+    /// The bodies that the panels belong to, and which each does. A solid is taken as one where all of `from` is
+    /// outside.
+    pub fn of(Setting { panels, obstacles, touch, .. }: Setting, from: &[DVec3]) -> (Vec<Body>, Vec<u16>) {
+        let mut bodies: Vec<Body> = Vec::new();
+        let mut body_of = Vec::with_capacity(panels.len());
+        for (k, panel) in panels.iter().enumerate() {
+            let body = match panel.solid {
+                Some(solid) if is_outside(solid, obstacles, from, touch) => Body::Solid(solid),
+                _ => Body::Panel(k as u16),
+            };
+            let known = bodies.iter().position(|b| *b == body).unwrap_or(bodies.len());
+            if known == bodies.len() {
+                bodies.push(body);
+            }
+            body_of.push(known as u16);
+        }
+        (bodies, body_of)
+    }
+
+    /// Its faces.
+    pub fn faces<'a>(self, setting: Setting<'a>) -> impl Iterator<Item = &'a Panel> {
+        let Setting { panels, obstacles, .. } = setting;
+        let (panel, solid) = match self {
+            Body::Panel(k) => (Some(panels[k as usize]), None),
+            Body::Solid(solid) => (None, Some(&obstacles.solids[solid as usize].faces)),
+        };
+        panel.into_iter().chain(solid.into_iter().flatten().map(move |face| &obstacles.panels[*face as usize]))
+    }
+}
+
+/// A body as seen from anywhere in a piece of a polygon.
+#[derive(Clone, Debug, Default)]
+pub struct Occluder {
+    /// The planes of its faces that look towards the piece, normals away from it.
+    pub faces: SmallVec<[(DVec3, f64); 3]>,
+    /// Those of them that the target crosses.
+    pub cuts: SmallVec<[(DVec3, f64); 3]>,
+    /// Its outline, counter-clockwise as seen from the piece.
+    pub edges: SmallVec<[Line; 6]>,
+}
+
+impl Occluder {
+    /// A body as seen from `place`; none if it hides nothing of the target from there.
+    pub fn new(body: Body, setting: Setting, place: DVec3) -> Option<Occluder> {
+        let mut occluder = match body {
+            Body::Panel(k) => Occluder::panel(setting.panels[k as usize], place),
+            Body::Solid(solid) => Occluder::solid(solid, setting.obstacles, place),
+        };
+        for &(beyond, offset) in &occluder.faces {
+            let heights = || setting.target.iter().map(|q| beyond.dot(*q) - offset);
+            if heights().all(|h| h <= setting.touch) {
+                return None;
+            }
+            if heights().any(|h| h < 0.0) {
+                occluder.cuts.push((beyond, offset));
+            }
+        }
+        Some(occluder)
+    }
+
+    /// A panel: its side that looks towards the place.
+    fn panel(panel: &Panel, place: DVec3) -> Occluder {
+        let is_above = panel.height(place) > 0.0;
+        let side = if is_above { -1.0 } else { 1.0 };
+        let n = panel.corners.len();
+        let edge = |i: usize| {
+            let (p, q) = (panel.corners[i], panel.corners[(i + 1) % n]);
+            Line::new(if is_above { [p, q] } else { [q, p] })
+        };
+        let faces = SmallVec::from_iter([(side * panel.normal, side * panel.offset)]);
+        Occluder { faces, cuts: SmallVec::new(), edges: (0..n).map(edge).collect() }
+    }
+
+    /// A solid: its faces that look towards the place, and the edges where they meet the others.
+    fn solid(solid: u32, obstacles: Obstacles, place: DVec3) -> Occluder {
+        let solid = &obstacles.solids[solid as usize];
+        let panel = |face: u32| &obstacles.panels[face as usize];
+        let is_front = |face: u32| panel(face).height(place) > 0.0;
+        let faces = solid.faces.iter().filter(|face| is_front(**face));
+        let edges = solid.edges.iter().filter(|(face, beyond, _)| is_front(*face) && !is_front(*beyond));
+        Occluder {
+            faces: faces.map(|face| (-panel(*face).normal, -panel(*face).offset)).collect(),
+            cuts: SmallVec::new(),
+            edges: edges.map(|(_, _, edge)| *edge).collect(),
+        }
+    }
+}
+
+/// An edge.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Line {
+    /// Its ends.
+    pub ends: [DVec3; 2],
+    /// The unit vector along it.
+    pub along: DVec3,
+}
+
+impl Line {
+    /// The edge between two ends.
+    pub fn new(ends: [DVec3; 2]) -> Line {
+        Line { ends, along: (ends[1] - ends[0]).normalize_or_zero() }
+    }
+}

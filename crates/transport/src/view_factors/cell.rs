@@ -1,0 +1,321 @@
+//! Cells: what places tell of a piece of a polygon, and what they cannot.
+//!
+//! A cell (parallelogram or triangle) has the mean T of its corners and the value M at its centre. Where the function
+//! is convex or concave in the cell, the integral lies between the two; their weighted mean, exact for quadratics, is
+//! taken.
+//!
+//! Places tell nothing of what lies between them. So where all corners see the whole, the cell is judged as one: if it
+//! is proven clear, nothing is hidden. Where one convex body hides all from each corner, it does so from all between.
+//! What is left of either has a closed form. In others a shadow that no place saw counts as an error, by what it could
+//! hide at most.
+//!
+//! Visible and hidden together have a closed form. Where places miss that, as they do between parts that touch or cross
+//! each other, it is taken for each cell, and the places tell its visible share alone.
+
+use super::clear::Exchange;
+use super::frame::Frame;
+use super::visible::Sight;
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+
+/// Halvings of an edge at most: 2^-12 of it is below what any accuracy needs.
+pub const DEPTH: i32 = 12;
+
+/// Least error by the difference of the corners where a shadow begins or ends in the cell. Where its edge halves a
+/// cell, the mean of the corners is the value at the centre by symmetry, and neither is the mean.
+const KINK: f64 = 0.03;
+
+/// Least error of the pieces of a cell by what its division changed: kinks settle as the square of the width, so a
+/// quarter of the change is left. After two divisions none is more than the larger of their changes: where the function
+/// is smooth, T and M are far apart long after their mean has settled. One small change may be chance.
+const LEFT: f64 = 0.25;
+
+/// The whole by this much less certain than its pieces: no division has told how its places mislead.
+const UNDIVIDED: f64 = 2.0;
+
+/// Error of what places did not see hidden, by what might be at most.
+const DOUBT: f64 = 0.25;
+
+/// The same of what they did not see visible past several panels, by all that there is; a sixteenth with each division.
+const GAP: f64 = 0.1;
+
+/// What may be is no more than this times the most that a place saw.
+const MORE: f64 = 4.0;
+
+/// Least error of a share by what places miss of all.
+const UNKNOWN: f64 = 0.25;
+
+/// Panels that may matter, by index.
+pub type List = SmallVec<[u16; 16]>;
+
+/// What is integrated: by places, and by cells.
+pub trait Shaded {
+    /// What of all is seen from a place on a side, past the panels listed.
+    fn sight(&mut self, side: u16, place: DVec3, list: &[u16]) -> Sight;
+
+    /// Visible and hidden together, from a place.
+    fn all(&mut self, place: DVec3) -> f64;
+
+    /// Which of the panels listed may hide something from a cell.
+    fn before(&mut self, corners: &[DVec3], list: &[u16]) -> List;
+
+    /// Whether nothing is hidden from any of a cell, which it is not from its corners.
+    fn is_clear(&mut self, corners: &[DVec3], list: &[u16]) -> bool;
+
+    /// The most that the panels listed might hide from the centre of a cell, seen from any of its places.
+    fn possible(&mut self, corners: &[DVec3], list: &[u16]) -> f64;
+
+    /// Visible and hidden together, over a cell.
+    fn whole(&mut self, cell: &Frame) -> Exchange;
+
+    /// Whether all that reaches some corner of the polygon is next to nothing by what reaches others.
+    fn is_steep(&self) -> bool;
+}
+
+/// A piece of the polygon.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    /// The piece.
+    pub frame: Frame,
+    /// Pieces of one side see the same bodies from the same side.
+    pub side: u16,
+}
+
+/// A cell: its corners on a grid of 2^[`DEPTH`] along the edges of a piece. As all is known that reaches it, what is
+/// visible and what is hidden have one error.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    piece: usize,
+    /// Least corner; of a triangle that stands on its head the greatest.
+    at: [i32; 2],
+    /// Length of an edge, negative for a triangle on its head.
+    size: i32,
+    /// What is visible, and what is hidden.
+    pub values: [f64; 2],
+    error: f64,
+    /// What places cannot tell: no division above says anything about it.
+    doubt: f64,
+    /// What the divisions above it changed, a sixteenth by level: a quarter for its share of them, and one for the
+    /// width.
+    changed: f64,
+    /// Least error where a shadow begins or ends.
+    least: f64,
+    /// Panels that may hide a part; none where all is proven.
+    before: Option<List>,
+}
+
+impl Cell {
+    /// Estimate of the error of either value.
+    pub fn error(&self) -> f64 {
+        self.error + self.doubt
+    }
+
+    /// Whether its division would tell more.
+    pub fn is_open(&self) -> bool {
+        self.before.is_some() && self.size.abs() > 2
+    }
+
+    fn is_undivided(&self) -> bool {
+        self.size.abs() == 1 << DEPTH
+    }
+}
+
+/// What a place sees: visible and hidden, and the bodies that hide, as bits.
+#[derive(Clone, Copy)]
+struct Place {
+    factors: [f64; 2],
+    hiding: u64,
+}
+
+impl Place {
+    fn all(&self) -> f64 {
+        self.factors[0] + self.factors[1]
+    }
+
+    /// Share of all that is visible, or `usual` if there is nothing.
+    fn share(&self, usual: f64) -> f64 {
+        let all = self.all();
+        if all > 0.0 { self.factors[0] / all } else { usual }
+    }
+}
+
+/// What the places of a cell see.
+struct Places {
+    corners: SmallVec<[Place; 4]>,
+    centre: Place,
+}
+
+impl Places {
+    /// Mean of the corners, and of all with weights that are exact for quadratics.
+    fn means(&self, f: impl Fn(&Place) -> f64) -> (f64, f64) {
+        let rim = self.corners.iter().map(&f).sum::<f64>() / self.corners.len() as f64;
+        let weight = if self.corners.len() == 4 { 2.0 / 3.0 } else { 0.75 };
+        (rim, rim + weight * (f(&self.centre) - rim))
+    }
+
+    /// How far the corners are apart.
+    fn range(&self, f: impl Fn(&Place) -> f64) -> f64 {
+        let (low, high) =
+            self.corners.iter().map(f).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        high - low
+    }
+
+    /// The most that any place sees.
+    fn most(&self, f: impl Fn(&Place) -> f64) -> f64 {
+        self.corners.iter().chain([&self.centre]).map(f).fold(0.0, f64::max)
+    }
+
+    /// Whether some places see a shadow and others not: it begins or ends between them.
+    fn is_bent(&self) -> bool {
+        self.corners.iter().any(|c| c.hiding != self.centre.hiding)
+    }
+}
+
+/// The share of both that is visible.
+fn share([visible, hidden]: [f64; 2]) -> f64 {
+    if visible + hidden > 0.0 { (visible / (visible + hidden)).clamp(0.0, 1.0) } else { 0.5 }
+}
+
+/// A polygon as pieces, and what was seen so far from corners of its cells.
+pub struct Domain<'a, S> {
+    pieces: &'a [Piece],
+    shaded: &'a mut S,
+    /// Whether cells take the closed form of all that they see.
+    is_known: bool,
+    /// By the side and the place, on a grid finer than the cells: pieces share corners.
+    sights: FxHashMap<(u16, [i32; 3]), Sight>,
+    /// Lines of that grid in a metre.
+    grid: f64,
+}
+
+/// Lines of the grid along the longest edge.
+const LINES: f64 = 1e6;
+
+impl<'a, S: Shaded> Domain<'a, S> {
+    pub fn new(pieces: &'a [Piece], shaded: &'a mut S) -> Self {
+        let edges = pieces.iter().flat_map(|piece| piece.frame.edges);
+        let grid = LINES / edges.map(|edge| edge.length()).fold(f64::MIN_POSITIVE, f64::max);
+        Domain { pieces, shaded, is_known: false, sights: FxHashMap::default(), grid }
+    }
+
+    /// The cells that together are all of it, past the panels listed; with `is_known` they take the closed form of all.
+    pub fn whole(&mut self, list: &[u16], is_known: bool) -> Vec<Cell> {
+        self.is_known = is_known;
+        (0..self.pieces.len()).map(|piece| self.cell(piece, [0, 0], 1 << DEPTH, list)).collect()
+    }
+
+    /// The four cells that a cell consists of.
+    pub fn divided(&mut self, cell: &Cell) -> [Cell; 4] {
+        let ([x, y], half) = (cell.at, cell.size / 2);
+        let is_square = self.pieces[cell.piece].frame.is_square;
+        let list = cell.before.as_deref().unwrap_or(&[]);
+        let list = self.shaded.before(&self.shape(cell).corners(), list);
+        let last = if is_square { half } else { -half };
+        let mut pieces = [([x, y], half), ([x + half, y], half), ([x, y + half], half), ([x + half, y + half], last)]
+            .map(|(at, size)| self.cell(cell.piece, at, size, &list));
+        let [visible, hidden] = [0, 1].map(|k| pieces.iter().map(|p| p.values[k]).sum::<f64>() - cell.values[k]);
+        let share = share(cell.values);
+        let change = ((1.0 - share) * visible - share * hidden).abs();
+        let changed = change.max(cell.changed / 16.0);
+        let most = if cell.is_undivided() { f64::INFINITY } else { changed };
+        for piece in &mut pieces {
+            if piece.before.is_some() {
+                piece.error = piece.error.clamp(0.25 * LEFT * change, most).max(piece.least);
+            }
+            piece.changed = changed;
+        }
+        pieces
+    }
+
+    fn shape(&self, cell: &Cell) -> Frame {
+        let frame = &self.pieces[cell.piece].frame;
+        let scale = 1.0 / f64::from(1 << DEPTH);
+        let [x, y] = cell.at.map(|x| scale * f64::from(x));
+        let edges = frame.edges.map(|edge| scale * f64::from(cell.size) * edge);
+        Frame { origin: frame.place(x, y), edges, is_square: frame.is_square }
+    }
+
+    fn corner(&mut self, side: u16, place: DVec3, list: &[u16]) -> Sight {
+        let from = self.pieces[0].frame.origin;
+        let on_grid = ((place - from) * self.grid).to_array().map(|x| x.round() as i32);
+        *self.sights.entry((side, on_grid)).or_insert_with(|| self.shaded.sight(side, place, list))
+    }
+
+    /// A cell of one past the panels listed.
+    fn cell(&mut self, piece: usize, at: [i32; 2], size: i32, list: &[u16]) -> Cell {
+        let [error, doubt, changed, least] = [0.0; 4];
+        let cell = Cell { piece, at, size, values: [0.0; 2], error, doubt, changed, least, before: None };
+        let (shape, side) = (self.shape(&cell), self.pieces[piece].side);
+        let corners = shape.corners();
+        let sights: SmallVec<[Sight; 4]> = corners.iter().map(|place| self.corner(side, *place, list)).collect();
+        let is_nothing = |by: u16| sights.iter().all(|s| matches!(s, Sight::Nothing(other) if *other == by));
+        match sights[0] {
+            Sight::Nothing(by) if is_nothing(by) => return self.settled(cell, &shape, 1),
+            _ if sights.iter().all(|s| matches!(s, Sight::Whole)) && self.shaded.is_clear(&corners, list) => {
+                return self.settled(cell, &shape, 0);
+            }
+            _ => {}
+        }
+        let centre = shape.centre();
+        let of_centre = self.shaded.sight(side, centre, list);
+        let places = Places {
+            corners: sights.into_iter().zip(&corners).map(|(sight, place)| self.place(sight, *place)).collect(),
+            centre: self.place(of_centre, centre),
+        };
+        self.estimate(Cell { before: Some(list.into()), ..cell }, &shape, &places)
+    }
+
+    /// A cell of which all is proven to be visible (0) or hidden (1).
+    fn settled(&mut self, mut cell: Cell, shape: &Frame, k: usize) -> Cell {
+        let Exchange { value, error } = self.shaded.whole(shape);
+        (cell.values[k], cell.error) = (value, error);
+        cell
+    }
+
+    fn place(&mut self, sight: Sight, place: DVec3) -> Place {
+        match sight {
+            Sight::Whole => Place { factors: [self.shaded.all(place), 0.0], hiding: 0 },
+            Sight::Nothing(_) => Place { factors: [0.0, self.shaded.all(place)], hiding: u64::MAX },
+            Sight::Partly { factors, hiding } => Place { factors, hiding },
+        }
+    }
+
+    /// What places tell of a cell.
+    fn estimate(&mut self, mut cell: Cell, shape: &Frame, places: &Places) -> Cell {
+        let area = shape.area();
+        let seen = [0, 1].map(|k| area * places.means(|p| p.factors[k]).1);
+        let (all, share) = (seen[0] + seen[1], share(seen));
+        let mut bend = if places.is_bent() { KINK } else { 0.0 };
+        cell.values = seen;
+        if self.is_known {
+            // The closed form, of which the places tell the share.
+            let whole = self.shaded.whole(shape).value;
+            cell.values = [share * whole, (1.0 - share) * whole];
+            cell.doubt = (whole - all).abs() * (UNKNOWN + share.min(1.0 - share));
+            // Where all changes from place to place, its share is no plain mean.
+            let high = places.corners.iter().map(Place::all).fold(0.0, f64::max);
+            bend = bend.max(KINK * if high > 0.0 { places.range(Place::all) / high } else { 1.0 });
+        }
+        cell.least = bend * (cell.values[0] + cell.values[1]) * places.range(|p| p.share(share));
+        // What is known of both together is taken off what places tell.
+        let off = |p: &Place| p.factors[0] - share * p.all();
+        let times = if cell.is_undivided() { UNDIVIDED } else { 1.0 };
+        cell.error = times * (area * (off(&places.centre) - places.means(off).0).abs() / 3.0).max(cell.least);
+        cell.doubt += self.doubt(&cell, shape, places);
+        cell
+    }
+
+    /// Error by what no place may have seen.
+    fn doubt(&mut self, cell: &Cell, shape: &Frame, places: &Places) -> f64 {
+        let (seen, hidden) = (places.most(|p| p.factors[0]), places.most(|p| p.factors[1]));
+        let level = f64::from(cell.size.abs()) / f64::from(1 << DEPTH);
+        let all = cell.values[0] + cell.values[1];
+        let gap = GAP * all * level.powi(4) * (1.0 - MORE * seen / (seen + hidden)).max(0.0);
+        if MORE * hidden >= seen + hidden {
+            return gap;
+        }
+        let possible = self.shaded.possible(&shape.corners(), cell.before.as_deref().unwrap_or(&[]));
+        gap + DOUBT * (shape.area() * (possible - MORE * hidden)).clamp(0.0, cell.values[0])
+    }
+}
