@@ -88,8 +88,10 @@ pub(crate) fn is_done(
     params: &Params,
     step: &mut impl FnMut(&[f64], &Info) -> Go,
 ) -> Result<bool, SolveError> {
-    if step(b, info) == Go::Stop {
-        return Err(SolveError::Stopped);
+    match step(b, info) {
+        Go::On => {}
+        Go::Enough => return Ok(true),
+        Go::Stop => return Err(SolveError::Stopped),
     }
     if info.residual.iter().all(|x| *x <= params.tolerance) {
         return Ok(true);

@@ -59,7 +59,8 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug)]
 pub struct Params {
     /// The residual E + R F B − B, in the space's norm, relative to that of E, in every band. The default 1e-6 is a
-    /// hundred times below what the transport's own error leaves visible.
+    /// hundred times below what the transport's own error leaves visible. At 0 only [`Go::Enough`] ends a solver, or
+    /// a residual of nothing at all.
     pub tolerance: f64,
     /// Largest amount of work, in applications of the transport ([`Info::work`]). It is looked at after each step, so
     /// that the last one may go beyond it.
@@ -157,7 +158,10 @@ pub enum SolveError {
 pub enum Go {
     /// Carry on.
     On,
-    /// Stop now.
+    /// This iterate will do, whatever its residual: it is the answer, and its [`Info`] says how good it is. So a solver
+    /// stops by any criterion (catalogue 42): the unshot share, the guaranteed bound, what is displayed, a clock.
+    Enough,
+    /// Stop now, without an answer.
     Stop,
 }
 

@@ -103,6 +103,10 @@ pub fn shooting_ambient<T: Shoot>(
         ambient.reflected(transport, shots.unshot(), &mut shown);
         add(&mut shown, b);
         if is_done(&shown, &info, params, &mut step)? {
+            // What was found good enough early is what was shown.
+            if info.residual.iter().any(|x| *x > params.tolerance) {
+                b.copy_from_slice(&shown);
+            }
             return Ok(info);
         }
         let source = shots.brightest(None);

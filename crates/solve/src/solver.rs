@@ -95,7 +95,8 @@ macro_rules! table {
         /// # Errors
         /// [`SolveError::Reflectance`] for a reflectance that is not between 0 and 1; [`SolveError::NotApplicable`]
         /// where the solver does not fit the response or the matrix; [`SolveError::NotConverged`] with the last
-        /// iterate left in `b`; [`SolveError::Stopped`] if `step` says so.
+        /// iterate left in `b`; [`SolveError::Stopped`] if `step` says [`Go::Stop`]. [`Go::Enough`] ends it with the
+        /// iterate that `step` saw.
         pub fn solve<T: Rows + Shoot>(
             solver: Solver,
             transport: &T,

@@ -224,6 +224,38 @@ fn catalogue_42_what_is_asked_for_is_kept() {
     }
 }
 
+/// Catalogue 42: each criterion that a callback can have is kept by the answer: the share that is unshot, the guaranteed
+/// bound, and the true error below it, decade by decade, by every solver that takes steps; the iterate that was found good
+/// enough is the one that is handed out, and it took no more work than a residual of 1e-13.
+#[test]
+fn catalogue_42_a_callback_ends_a_solver_by_any_criterion() {
+    let criteria: [(&str, fn(&Info) -> f64); 2] =
+        [("bound", |info| info.bound[0]), ("unshot", |info| info.unshot[0].abs())];
+    for system in [cube(0.8), room(3)] {
+        let exact = system.exact();
+        for solver in certain().filter(|solver| !solver.is_direct()) {
+            let (_, whole) = system.solve(solver, &tight()).unwrap();
+            for (name, left) in criteria {
+                for asked in (0..8).map(|k| 0.1f64.powi(k)) {
+                    let mut b = vec![0.0; exact.len()];
+                    let mut seen = Vec::new();
+                    let step = |b: &[f64], info: &Info| {
+                        seen = b.to_vec();
+                        if left(info) <= asked { Go::Enough } else { Go::On }
+                    };
+                    let params = Params { tolerance: 0.0, ..tight() };
+                    let info =
+                        solve(solver, &system.transport, &system.response, &system.e, &mut b, &params, step).unwrap();
+                    assert!(left(&info) <= asked && seen == b, "{solver}, {name} {asked:e}: {:e}", left(&info));
+                    assert!(info.work <= whole.work, "{solver}, {name} {asked:e}: {} of {}", info.work, whole.work);
+                    let error = b.iter().zip(&exact).fold(0f64, |worst, (b, x)| worst.max((b - x).abs()));
+                    assert!(error <= info.bound[0] * (1.0 + 1e-12) + 1e-13, "{solver}, {name} {asked:e}: {error:e}");
+                }
+            }
+        }
+    }
+}
+
 /// Catalogue 35: what no surface reflects is refused, with its place.
 #[test]
 fn catalogue_35_reflectances_are_checked() {
