@@ -10,6 +10,7 @@ mod element_facets;
 pub mod elements;
 pub mod facet;
 pub mod fault;
+pub mod lab;
 pub mod light;
 pub mod material;
 pub mod mesh;
