@@ -102,11 +102,16 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let is_exposed = is_exposed || arguments.image.as_deref().is_some_and(|path| !views::is_exr(path));
     arguments.picture.warn_of_what_has_no_effect(wants_view, is_exposed, progress);
     // A camera that is not there is a fault even where none is needed.
-    let needs_camera = wants_view || arguments.picture.camera.is_some() || arguments.picture.eye.is_some();
+    let needs_camera = wants_view
+       
+        || arguments.picture.camera.is_some()
+        || arguments.picture.eye.is_some();
     let camera = needs_camera.then(|| views::camera(&input.scene, &tracer, &arguments.picture)).transpose()?;
 
     progress.parts();
-    let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
+    arguments.solve.warn_of_loose_solver(progress);
+    progress.limit(arguments.solve.time);
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), progress)?;
 
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");
@@ -166,7 +171,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         );
     }
     let written = (&audit, rounds, lightmap);
-    let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref()), written, &files, progress);
+    let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref(), exposure), written, &files, progress);
     for path in &arguments.report {
         let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,
@@ -177,7 +182,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.stage(path, text.as_bytes())?;
     }
     outputs.commit()?;
-    tell(&report, global, progress)
+    tell(&report, arguments.solve.delta_e, global, progress)
 }
 
 fn output_path(arguments: &Arguments) -> PathBuf {
@@ -223,12 +228,15 @@ struct ResultEvent<'a> {
 }
 
 /// The last word: what was reached and where it is.
-fn tell(report: &Report, global: &Global, progress: &Progress) -> Result<(), Failure> {
+fn tell(report: &Report, delta_e: Option<f64>, global: &Global, progress: &Progress) -> Result<(), Failure> {
     if global.json {
         let event = ResultEvent { event: "result", report };
         return print(&serde_json::to_string(&event).map_err(Failure::work)?);
     }
     progress.say(&report.error.line());
+    if let Some(asked) = delta_e {
+        progress.say(&views::nearness(&report.solution.displayed, asked));
+    }
     if let Some(map) = report.lightmap.as_ref().filter(|map| map.reduced_charts > 0) {
         progress.say(&format!(
             "warning: {} not fit on a page at {} texels per metre; --max-atlas allows larger pages",

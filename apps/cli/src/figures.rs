@@ -30,6 +30,7 @@ pub const CLOSURE: &str =
 pub const RESIDUAL: &str = "what the solved equation still lacks, relative to its right-hand side";
 pub const BOUND: &str =
     "lm/m²; no element's radiosity is farther from the exact solution of the discrete equation, by ‖r‖∞/(1 − ρ max)";
+pub const DISPLAYED: &str = "ΔE*ab, of 100 from black to white; what that bound may change of what an exposed, tone-mapped picture shows of any surface";
 pub const STEPS: &str = "times that light was passed on between all elements";
 pub const ELEMENTS: &str = "pieces that the surfaces were cut into";
 pub const RAYS: &str =
@@ -63,6 +64,7 @@ pub const ABOUT: &[(&str, &str)] = &[
     ("solution.raw_closure", CLOSURE),
     ("solution.relative_residual", RESIDUAL),
     ("solution.guaranteed_bound", BOUND),
+    ("solution.displayed.delta_e", DISPLAYED),
     ("solution.steps", STEPS),
     ("time.stages", "seconds by stage; they sum to the whole"),
     ("time.seconds", SECONDS),

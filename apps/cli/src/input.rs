@@ -6,7 +6,7 @@ use clap::Args;
 use radiosity::io::{Document, LoadOptions};
 use radiosity::solve::Solver;
 use radiosity::transport::{FormFactorMethod, HitTable};
-use radiosity::{Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up, size};
+use radiosity::{Displayed, Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up, size};
 use std::f64::consts::SQRT_2;
 use std::path::{Path, PathBuf};
 
@@ -84,6 +84,14 @@ pub struct SolveArguments {
     /// cholesky, random-walk and stochastic-jacobi need `--ff adaptive`; lu and cholesky fill matrices, as --ff does.
     #[arg(long, value_name = "NAME", default_value_t = Solver::DeflatedJacobi, hide_default_value = true)]
     pub solver: Solver,
+    /// Solve until what is displayed is known to be within this ΔE*ab of the solution, on every surface (2.3 is just
+    /// noticed), instead of to a residual of 1e-4. It tells of the solver alone; --error of all the rest too.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = numbers::delta_e)]
+    pub delta_e: Option<f64>,
+    /// When the answer so far will do, such as 30s or 5min since the start: refinement ends then, and what it has is written
+    /// with its error, which takes some more. The answer depends on the machine then. [also: --budget]
+    #[arg(long, alias = "budget", value_name = "TIME", allow_hyphen_values = true, value_parser = numbers::seconds)]
+    pub time: Option<f64>,
     /// Most rounds of refinement.
     #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true)]
     pub rounds: usize,
@@ -95,13 +103,24 @@ pub struct SolveArguments {
 impl SolveArguments {
     /// As the library takes them.
     pub fn options(&self) -> radiosity::SolveOptions {
-        let default = radiosity::SolveOptions::default();
         radiosity::SolveOptions {
             element_size: self.element_size,
             memory: self.memory,
             form_factors: self.form_factors.0,
-            solver: self.solver,
-            ..default
+            displayed: self.delta_e.map(|delta_e| Displayed { delta_e, exposure: None }),
+            ..radiosity::SolveOptions::of(self.solver)
+        }
+    }
+
+    /// Tells of what is asked less exactly than is usual.
+    pub fn warn_of_loose_solver(&self, progress: &Progress) {
+        let (own, usual) = (self.options().params.tolerance, radiosity::SolveOptions::default().params.tolerance);
+        if own > usual && self.delta_e.is_none() {
+            progress.say(&format!(
+                "note: {} is asked for a relative residual of {own}, not {usual} as others are: its noise falls with the \
+                 root of the work",
+                self.solver
+            ));
         }
     }
 
@@ -154,16 +173,14 @@ impl SolveArguments {
         )))
     }
 
-    /// As the library takes them to light surfaces.
-    pub fn bake(&self) -> radiosity::BakeOptions {
+    /// As the library takes them to light surfaces; what is displayed is judged at the exposure of the picture, if it is given.
+    pub fn bake(&self, picture: &PictureArguments) -> radiosity::BakeOptions {
         let default = radiosity::BakeOptions::default();
-        radiosity::BakeOptions {
-            error: self.error,
-            solve: self.options(),
-            rounds: self.rounds,
-            seed: self.seed,
-            ..default
+        let mut solve = self.options();
+        if let Some(displayed) = &mut solve.displayed {
+            displayed.exposure = picture.exposure;
         }
+        radiosity::BakeOptions { error: self.error, solve, rounds: self.rounds, seed: self.seed, ..default }
     }
 
     /// As the library takes them to measure at points.

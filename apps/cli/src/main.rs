@@ -185,6 +185,7 @@ impl From<radiosity::Error> for Failure {
             | radiosity::Error::Factors(_)
             | radiosity::Error::Matrix { .. }
             | radiosity::Error::Element(_)
+            | radiosity::Error::Tolerance { .. }
             | radiosity::Error::Lightmap(_) => Failure::input(error),
             other => Failure::work(other),
         }

@@ -51,6 +51,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let tracer = Tracer::new(&input.scene, &input.mesh);
     let places: Vec<_> = points.iter().map(|p| (p.position, p.normal)).collect();
     progress.parts();
+    arguments.solve.warn_of_loose_solver(progress);
+    progress.limit(arguments.solve.time);
     let measured = radiosity::measure(&tracer, &places, &arguments.solve.measure(), progress)?;
 
     // A file that was measured before gets its answer anew, not twice.
@@ -79,7 +81,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             None
         }
     };
-    let error = ErrorReport::new(&measured.audit, &measured.audit, &arguments.solve);
+    let error = ErrorReport::new((&measured.audit, &measured.audit), &arguments.solve, measured.out_of_time);
     if global.json {
         let values: Option<&[radiosity::Bands]> = arguments.output.is_none().then_some(&measured.irradiance);
         let result = serde_json::json!({

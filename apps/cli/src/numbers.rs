@@ -71,6 +71,12 @@ pub fn error(text: &str) -> Result<f64, String> {
     })
 }
 
+/// A difference of colours: 100 is black against white.
+pub fn delta_e(text: &str) -> Result<f64, String> {
+    let value = positive(text).ok().filter(|x| (1e-3..=100.0).contains(x));
+    value.ok_or_else(|| "use a ΔE from 0.001 to 100, such as 1".to_owned())
+}
+
 /// A size in bytes. Units are powers of 1024; a number without one is refused, as it may mean anything.
 pub fn bytes(text: &str) -> Result<usize, String> {
     let wrong = || "use a size with its unit, such as 500M or 4G, also written 500MiB or 4GB".to_owned();

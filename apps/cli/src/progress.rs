@@ -7,7 +7,7 @@ use serde_json::json;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Events are printed at most this often.
 const EVERY_MILLISECONDS: u64 = 200;
@@ -19,6 +19,8 @@ pub struct Progress {
     verbose: bool,
     quiet: bool,
     start: Instant,
+    /// Seconds from the start after which the answer so far will do, by their bits; infinite without a limit.
+    limit: AtomicU64,
     stage: Mutex<Stage>,
     last: AtomicU64,
 }
@@ -76,6 +78,7 @@ impl Progress {
             verbose: global.verbose,
             quiet: global.quiet,
             start,
+            limit: AtomicU64::new(f64::INFINITY.to_bits()),
             stage: Mutex::new(stage),
             last: AtomicU64::new(0),
         }
@@ -100,6 +103,16 @@ impl Progress {
             }
             output::interrupt()
         })
+    }
+
+    /// Lets the answer do that there is after so many seconds since the start.
+    pub fn limit(&self, seconds: Option<f64>) {
+        self.limit.store(seconds.unwrap_or(f64::INFINITY).to_bits(), Ordering::Relaxed);
+    }
+
+    /// Whether that time is over.
+    pub fn is_over(&self) -> bool {
+        self.deadline().is_some_and(|deadline| Instant::now() >= deadline)
     }
 
     /// Begins a part of the work; the library's own stages count to it.
@@ -212,6 +225,11 @@ impl Monitor for Progress {
             }
         }
         true
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        let seconds = f64::from_bits(self.limit.load(Ordering::Relaxed));
+        seconds.is_finite().then(|| self.start + Duration::from_secs_f64(seconds))
     }
 
     fn note(&self, text: &str) {

@@ -35,7 +35,9 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     arguments.picture.warn_of_what_has_no_effect(true, !views::is_exr(&arguments.output), progress);
     let camera = views::camera(&input.scene, &tracer, &arguments.picture)?;
     progress.parts();
-    let baked = radiosity::bake(&tracer, &arguments.solve.bake(), progress)?;
+    arguments.solve.warn_of_loose_solver(progress);
+    progress.limit(arguments.solve.time);
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), progress)?;
     progress.part("picture");
     let (width, height) = views::picture_size(&camera, arguments.picture.size);
     let render = RenderOptions { width, height, ..RenderOptions::default() };
@@ -47,15 +49,20 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
     outputs.commit()?;
 
-    let error = ErrorReport::new(&audit, &baked.audit, &arguments.solve);
+    let is_over = baked.out_of_time || progress.is_over();
+    let error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
+    let shown = baked.solution.displayed(Some(exposure));
     if global.json {
         let result = serde_json::json!({
             "event": "result", "error": error, "output": arguments.output, "width": width, "height": height,
-            "exposure": exposure, "stages": progress.spent(), "seconds": progress.seconds(),
+            "exposure": exposure, "displayed": shown, "stages": progress.spent(), "seconds": progress.seconds(),
         });
         return print(&result.to_string());
     }
     progress.say(&error.line());
+    if let Some(asked) = arguments.solve.delta_e {
+        progress.say(&views::nearness(&shown, asked));
+    }
     let output = arguments.output.display();
     progress.say(&format!("wrote {output} ({width} x {height}), {:.1} s", progress.seconds()));
     Ok(())

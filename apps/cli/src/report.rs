@@ -4,7 +4,7 @@ use crate::illuminance::Illuminance;
 use crate::progress::Progress;
 use crate::{figures, input};
 use radiosity::measure::Round;
-use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Sky, View, WrittenRound};
+use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Shown, Sky, View, WrittenRound};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -73,6 +73,8 @@ pub struct ErrorReport {
     pub asked: f64,
     /// Whether the audit's upper bound meets it.
     pub achieved: bool,
+    /// Whether it does not because --time was over.
+    pub out_of_time: bool,
     /// The audit's estimate.
     pub estimated: f64,
     /// One-sided 95 % bound from above; infinite (in JSON: null) where there is none.
@@ -100,11 +102,13 @@ pub struct ErrorReport {
 }
 
 impl ErrorReport {
-    /// Of an audit of what is handed out, one of the solution that it was read from, and what was asked.
-    pub fn new(audit: &Audit, solution: &Audit, solve: &input::SolveArguments) -> ErrorReport {
+    /// Of an audit of what is handed out, one of the solution that it was read from, and what was asked; and whether time
+    /// was over.
+    pub fn new((audit, solution): (&Audit, &Audit), solve: &input::SolveArguments, is_over: bool) -> ErrorReport {
         ErrorReport {
             asked: solve.error,
             achieved: audit.upper <= solve.error,
+            out_of_time: is_over && audit.upper > solve.error,
             estimated: audit.error,
             upper_95_one_sided: audit.upper,
             lower_95_one_sided: audit.lower,
@@ -134,7 +138,11 @@ impl ErrorReport {
             return "there is no light: all is black".to_owned();
         }
         let percent = |x: f64| format!("{:.3} %", 100.0 * x);
-        let verdict = if self.achieved { "reached" } else { "NOT reached" };
+        let verdict = match (self.achieved, self.out_of_time) {
+            (true, _) => "reached",
+            (false, true) => "NOT reached, as the time was over",
+            (false, false) => "NOT reached",
+        };
         let bound = match self.upper_95_one_sided {
             upper if upper.is_finite() => format!("at most {} with 95 % confidence", percent(upper)),
             _ => "without a bound, since the audit had too few points".to_owned(),
@@ -181,6 +189,8 @@ pub struct SolutionReport {
     pub relative_residual: Vec<f64>,
     /// Guaranteed bound of the discrete equation's error by band, lm/m².
     pub guaranteed_bound: Vec<f64>,
+    /// What that may change of what is displayed; infinite (in JSON: null) where nothing is guaranteed.
+    pub displayed: Shown,
 }
 
 /// What is said of time.
@@ -245,7 +255,7 @@ impl Report {
     pub fn new(
         input: &input::Input,
         solve: &input::SolveArguments,
-        (baked, view): (&Baked, Option<&View>),
+        (baked, view, exposure): (&Baked, Option<&View>, f64),
         (written, written_rounds, lightmap): (&Audit, Vec<WrittenRound>, Option<LightmapReport>),
         outputs: &[&Path],
         progress: &Progress,
@@ -294,7 +304,10 @@ impl Report {
                 other_light: other_light(input, !solution.luminaires.lights.is_empty()),
                 area: (0..input.mesh.triangles.len()).map(|t| input.mesh.area(t)).sum(),
             },
-            error: ErrorReport { finer, ..ErrorReport::new(written, &baked.audit, solve) },
+            error: ErrorReport {
+                finer,
+                ..ErrorReport::new((written, &baked.audit), solve, baked.out_of_time || progress.is_over())
+            },
             illuminance,
             rounds: baked.rounds.clone(),
             written_rounds,
@@ -310,6 +323,7 @@ impl Report {
                 steps: solution.info.steps,
                 relative_residual: solution.info.residual.clone(),
                 guaranteed_bound: solution.info.bound.clone(),
+                displayed: solution.displayed(view.map(|_| exposure)),
             },
             time: TimeReport {
                 seconds: stages.iter().map(|stage| stage.seconds).sum(),

@@ -1,12 +1,12 @@
 //! Views of a solution: from where, how large, and of what — the luminance that an eye sees, the illuminance that a
 //! meter on the surface would show.
 
-use crate::Failure;
 use crate::illuminance::Illuminance;
 use crate::input::PictureArguments;
 use crate::progress::Progress;
+use crate::{Failure, numbers};
 use radiosity::io::image_out::{encode_exr, encode_png};
-use radiosity::{Camera, Picture, Scene, Sky, Tracer, View};
+use radiosity::{Camera, Picture, Scene, Shown, Sky, Tracer, View};
 use std::path::Path;
 
 /// Pictures in a report are made smaller than this, pixels: a page should open at once, and screens show no more.
@@ -55,6 +55,19 @@ pub fn explain_black(picture: &Picture, scene: &Scene, progress: &Progress) {
     if matches!(scene.sky, Sky::Overcast { .. }) && black > picture.pixels.len() / 20 {
         progress
             .say("note: the overcast sky ends at the horizon, and the picture is black below; a ground would be lit");
+    }
+}
+
+/// How near to the solution of its equation what is displayed is known to be, and whether that is as asked: the exposure of
+/// a picture is known after the solve.
+pub fn nearness(shown: &Shown, asked: f64) -> String {
+    let (delta_e, exposure) = (numbers::rough(shown.delta_e), numbers::fixed(shown.exposure, 2));
+    match shown.delta_e <= asked {
+        true => format!("what is displayed is within ΔE {delta_e} of the solution of its equation"),
+        false => format!(
+            "warning: at the exposure of this picture, {exposure} EV, what is displayed is known to be within ΔE {delta_e} \
+             of the solution, not {asked}; --exposure {exposure} has it solved for this picture"
+        ),
     }
 }
 

@@ -2,13 +2,14 @@
 
 use crate::answer::Station;
 use crate::field::SMOOTHING;
-use crate::measure::{Round, certify, is_stalled, most_paths, rays_for};
-use crate::monitor::{Monitor, Stages};
+use crate::measure::{ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
+use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
 use radiosity_scene::Bands;
 use radiosity_trace::Tracer;
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor, Field};
+use std::time::Instant;
 
 /// Cells to aim for: 10,000 leave those of a room with a garden 0.4 m wide, and contacts blurred.
 const CELLS: usize = 30_000;
@@ -61,6 +62,8 @@ pub struct Baked<'a> {
     pub audit: Audit,
     /// Whether the audit's upper bound meets the asked error.
     pub achieved: bool,
+    /// Whether it does not because time was over ([`Monitor::deadline`]).
+    pub out_of_time: bool,
     /// The rounds.
     pub rounds: Vec<Round>,
     /// Time by stage, over all rounds and the audits of what was written.
@@ -79,7 +82,8 @@ pub struct Baked<'a> {
 /// # Errors
 /// As [`Solution::new`]. Not reaching the error asked is not an error: see [`Baked::achieved`].
 pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Monitor) -> Result<Baked<'a>, Error> {
-    let start = std::time::Instant::now();
+    let start = Instant::now();
+    let mut begun = start;
     let stages = Stages::default();
     let mut solve = options.solve;
     solve.cells = solve.cells.max(CELLS);
@@ -107,7 +111,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         // than elements that small.
         let mut rays = gather_rays(options.error);
         for _ in 0..GATHERS {
-            if audit.upper <= options.error {
+            if audit.upper <= options.error || is_over(monitor) {
                 break;
             }
             let answer = solution.at(&watched, Indirect::Gather { rays }, &shadowing, monitor)?;
@@ -131,7 +135,10 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             ..solve
         };
         let fits = Solution::fits(tracer, &next);
-        if achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) || is_stalled(&rounds) {
+        let is_last = achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) || is_stalled(&rounds);
+        // Once begun a round is brought to its end, so that what it replaces may go.
+        let out_of_time = !is_last && !has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64());
+        if is_last || out_of_time {
             stages.absorb(&solution.stages);
             return Ok(Baked {
                 solution,
@@ -141,6 +148,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 shadowing,
                 audit,
                 achieved,
+                // A first round that was cut short may have ended it in other ways.
+                out_of_time: !achieved && (out_of_time || is_over(monitor)),
                 rounds,
                 stages,
                 error: options.error,
@@ -151,6 +160,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             });
         }
         monitor.round(rounds.len() + 1, options.rounds + 1);
+        begun = Instant::now();
         shadowing.rays *= 2;
         if noisy {
             solution.refine(next.rays, monitor)?;

@@ -4,8 +4,9 @@
 //! table as it is; those that need rows or columns get it as a stored matrix.
 
 use crate::Error;
-use crate::monitor::Monitor;
-use radiosity_scene::{Elements, Enclosure, Mesh};
+use crate::displayed::{Displayed, Screen};
+use crate::monitor::{Monitor, is_over};
+use radiosity_scene::{Bands, Elements, Enclosure, Mesh};
 use radiosity_solve::{
     Go, Info, Params, SheetResponse, SolveError, Solver, SparseTransport, Transport, solve as solve_stored,
     solve_operator,
@@ -92,41 +93,80 @@ impl Way {
     }
 }
 
-/// Relative residual that random methods are asked for at least: it falls with the root of the work, and 1e-4 would take ten
-/// thousand sweeps. Light errs by less, as most of the residual is noise from element to element; the audit sees what is left.
-const RANDOM_TOLERANCE: f64 = 5e-3;
+/// Relative residual that random methods are asked for where nothing else is: it falls with the root of the work, and 1e-4
+/// would take ten thousand sweeps. Light errs by less, as most of the residual is noise from element to element; the audit
+/// sees what is left.
+pub const RANDOM_TOLERANCE: f64 = 5e-3;
 
-/// Solves X = E + R F X in place, by the matrix if there is one.
+/// Least relative residual that can be asked of a table of hit ids that is only applied: its values are in single precision,
+/// and asking for more than they can tell would never end.
+pub const TABLE_TOLERANCE: f64 = 1e-6;
+
+/// Work between two looks at what is displayed, applications of F: a look costs about as much as a tenth of one.
+const LOOK: f64 = 0.5;
+
+/// Sweeps that are made whether or not there is time, where one is a step: some milliseconds each, and without them there is
+/// no reflected light.
+const FIRST_SWEEPS: f64 = 4.0;
+
+/// How to solve, and when an iterate will do.
+pub(crate) struct Task<'a> {
+    pub solver: Solver,
+    pub params: &'a Params,
+    /// What is displayed, how near it has to be.
+    pub displayed: Option<(&'a Screen, Displayed)>,
+}
+
+/// Solves X = E + R F X in place, by the matrix if there is one. When the monitor's time is over, the iterate by then is the
+/// answer.
 pub(crate) fn solve(
     (table, matrix): (&HitTable, Option<&Matrix>),
     response: &SheetResponse,
     (e, x): (&[f64], &mut [f64]),
-    (solver, params): (Solver, &Params),
+    task: &Task,
     monitor: &dyn Monitor,
 ) -> Result<Info, Error> {
-    let least = if solver.is_random() { RANDOM_TOLERANCE } else { 0.0 };
-    let params = &Params { tolerance: params.tolerance.max(least), ..*params };
-    let mut way = Way::new(solver.is_random(), params.tolerance, &response.diffuse.reflectance);
-    let step = |_: &[f64], info: &Info| {
-        let go = monitor.step(way.done(info), PARTS);
-        if go { Go::On } else { Go::Stop }
-    };
-    let solved = match matrix {
-        Some(matrix) => solve_stored(solver, &matrix.factors, response, e, x, params, step),
-        None => {
-            // Rows keep their values in single precision: asking for more than they can tell would never end.
-            let params = Params { tolerance: params.tolerance.max(1e-6), ..*params };
-            if solver.applies_only() {
-                solve_operator(solver, table, response, e, x, &params, step)
-            } else {
-                solve_stored(solver, &table.matrix()?, response, e, x, &params, step)
+    let solver = task.solver;
+    let mut way = Way::new(solver.is_random(), task.params.tolerance, &response.diffuse.reflectance);
+    let (mut looked, mut reached) = (f64::NEG_INFINITY, f64::INFINITY);
+    let step = |x: &[f64], info: &Info| {
+        if !monitor.step(way.done(info), PARTS) {
+            return Go::Stop;
+        }
+        if is_over(monitor) && (info.work >= FIRST_SWEEPS || !solver.applies_only()) {
+            return Go::Enough;
+        }
+        if let Some((screen, asked)) = task.displayed {
+            if info.work >= looked + LOOK || solver.is_direct() {
+                looked = info.work;
+                reached = screen.shown(&single(x), &info.bound, asked.exposure).delta_e;
+            }
+            if reached <= asked.delta_e {
+                return Go::Enough;
             }
         }
+        Go::On
     };
-    solved.map_err(|error| match error {
-        SolveError::Stopped => Error::Stopped,
-        other => Error::Solve(other),
+    // Where the display decides, the residual does not.
+    let tolerance = if task.displayed.is_some() { 0.0 } else { task.params.tolerance };
+    let params = Params { tolerance, ..*task.params };
+    let solved = match matrix {
+        Some(matrix) => solve_stored(solver, &matrix.factors, response, e, x, &params, step),
+        None if solver.applies_only() => solve_operator(solver, table, response, e, x, &params, step),
+        None => solve_stored(solver, &table.matrix()?, response, e, x, &params, step),
+    };
+    solved.map_err(|error| match (error, task.displayed) {
+        (SolveError::Stopped, _) => Error::Stopped,
+        (SolveError::NotConverged { info, .. }, Some((_, Displayed { delta_e, .. }))) => {
+            Error::Displayed { asked: delta_e, reached, steps: info.steps }
+        }
+        (other, _) => Error::Solve(other),
     })
+}
+
+/// A field of three bands in single precision, as it is kept.
+pub(crate) fn single(x: &[f64]) -> Vec<Bands> {
+    x.chunks_exact(3).map(|x| [x[0] as f32, x[1] as f32, x[2] as f32]).collect()
 }
 
 #[cfg(test)]

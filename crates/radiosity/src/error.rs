@@ -12,6 +12,33 @@ pub enum Error {
     /// The solver did not reach its tolerance.
     #[error("the radiosity equation was not solved: {0}")]
     Solve(#[from] radiosity_solve::SolveError),
+    /// What is displayed was not brought as near as asked.
+    #[error(
+        "after {steps} steps of the solver what is displayed is only known to be within ΔE {reached:.3} of the solution, not \
+         within {asked}{}", if reached.is_finite() { "" } else { ": a surface gives back all its light, and no bound is known" }
+    )]
+    Displayed {
+        /// ΔE*ab asked for.
+        asked: f64,
+        /// What is guaranteed; infinite where nothing is.
+        reached: f64,
+        /// Steps of the solver.
+        steps: usize,
+    },
+    /// The residual asked for is less than single precision can tell.
+    #[error(
+        "a relative residual of {asked:e} is asked for, and hit tables in single precision tell {least:e} at best (a solver \
+         that needs rows, such as gauss-seidel, keeps them in double precision)"
+    )]
+    Tolerance {
+        /// Relative residual asked for.
+        asked: f64,
+        /// The least that can be.
+        least: f64,
+    },
+    /// The time was over before there was an answer of the kind that was asked for.
+    #[error("the time was over before {0} were found, and without them there is no answer; allow more")]
+    Time(&'static str),
     /// The memory that was allowed does not suffice.
     #[error(
         "{elements} elements with {rays} rays each need {}; {} allowed (use larger elements or allow more)",

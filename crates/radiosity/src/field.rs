@@ -2,7 +2,7 @@
 //! noise where it is looked at.
 
 use crate::measure::brought_nothing;
-use crate::monitor::{Monitor, Watch};
+use crate::monitor::{Monitor, Watch, is_over};
 use crate::{Error, Solution};
 use glam::DVec3;
 use radiosity_scene::{Bands, luminance};
@@ -81,6 +81,7 @@ impl Solution<'_> {
         while noises.last().is_some_and(|last| *last > error.min(VISIBLE))
             && rays <= MOST_RAYS
             && !brought_nothing(&noises)
+            && !is_over(monitor)
         {
             self.gather_on(&seen, rays, &mut light, monitor)?;
             noises.push(noise(&light));

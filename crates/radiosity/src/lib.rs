@@ -18,6 +18,7 @@ pub mod bake;
 mod canvas;
 pub mod compare;
 mod cornell;
+mod displayed;
 mod division;
 mod equation;
 mod error;
@@ -38,18 +39,25 @@ pub use answer::{Answer, Indirect};
 pub use bake::{BakeOptions, Baked, bake};
 pub use compare::{CompareOptions, Comparison, compare};
 pub use cornell::cornell_box;
+pub use displayed::{Displayed, Shown};
+pub use equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
 pub use error::Error;
 pub use factors::{Doubt, Excess, Factors, FactorsOptions, Missed, factors};
 pub use judge::WrittenRound;
 pub use lightmap::{Lightmap, TEXEL_BYTES, lightmap};
 pub use measure::{MeasureOptions, Measurement, measure};
-pub use monitor::{Monitor, Stages};
+pub use monitor::{Monitor, Stages, Timed};
 pub use render::{RenderOptions, View, render};
 pub use solution::{Balance, Solution, SolveOptions};
 pub use vertex_light::{VertexLight, vertex_light};
 pub use viewpoint::place_camera;
 
 pub use radiosity_io as io;
+/// What a display makes of light, and how far apart two of its colours are.
+pub mod display {
+    pub use radiosity_scene::display::{srgb, tone_map};
+    pub use radiosity_scene::lab::{delta_e, lab};
+}
 pub use radiosity_scene::{
     AlphaMode, Bands, Camera, Elements, Enclosure, EnclosureSurface, Facet, Fault, Faults, Material, Mesh, Object,
     PointLight, PointLightKind, Projection, Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef,

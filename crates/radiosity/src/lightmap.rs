@@ -4,6 +4,7 @@ use crate::bake::Baked;
 use crate::canvas::Canvas;
 use crate::faces::lit_vertex;
 use crate::judge::{Judge, STEP, WrittenRound, is_stalled, root_mean_square};
+use crate::monitor::is_over;
 use crate::{Error, Monitor};
 use glam::DVec2;
 use radiosity_io::gltf_out::{Encoding, Light, LitPrimitive, PageImage};
@@ -107,7 +108,7 @@ pub fn lightmap(
     // Finer texels while the map misses what the solution has and the texels that are needed can be had.
     let tolerance = baked.error * root_mean_square(&baked.solution);
     let mut needed = None;
-    while texels_per_metre.is_none() && rounds.len() <= ROUNDS && !is_stalled(&rounds) {
+    while texels_per_metre.is_none() && rounds.len() <= ROUNDS && !is_stalled(&rounds) && !is_over(monitor) {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let detail = canvas.detail(&drawn, tolerance);
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);

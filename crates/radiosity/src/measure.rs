@@ -4,7 +4,7 @@
 //! average out over its rays. The referee watches a part of the points; rays are doubled until its upper bound meets
 //! the target, or until the budget ends, and the report says which.
 
-use crate::monitor::{Monitor, Stages};
+use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::{Error, Solution, SolveOptions, stations};
 use glam::DVec3;
 use radiosity_scene::Bands;
@@ -12,6 +12,7 @@ use radiosity_trace::{Place, Tracer};
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor};
 use serde::Serialize;
+use std::time::Instant;
 
 /// How to measure.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +44,12 @@ const LEAST_WATCHED: usize = 64;
 /// Up to how many times as many paths go to each point where points are few.
 const CLOSER: usize = 16;
 
+/// How much longer a round takes than the one before, about: twice the rays, and more of them find something.
+pub(crate) const ROUND_GROWTH: f64 = 2.5;
+
+/// Fewest gather rays that an answer is given with.
+const FEWEST_GATHERED: usize = 32;
+
 /// One round of refinement.
 #[derive(Clone, Debug, Serialize)]
 pub struct Round {
@@ -69,7 +76,7 @@ impl Round {
         gather: usize,
         shadowing: &Shadowing,
         audit: &Audit,
-        start: std::time::Instant,
+        start: Instant,
     ) -> Round {
         Round {
             elements: solution.elements.len(),
@@ -98,6 +105,8 @@ pub struct Measurement {
     pub audit: Audit,
     /// Whether the audit's upper bound meets the asked error.
     pub achieved: bool,
+    /// Whether it does not because time was over ([`Monitor::deadline`]).
+    pub out_of_time: bool,
     /// The rounds.
     pub rounds: Vec<Round>,
     /// Time by stage.
@@ -124,7 +133,7 @@ pub fn measure(
     options: &MeasureOptions,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, Error> {
-    let start = std::time::Instant::now();
+    let start = Instant::now();
     let stages = Stages::default();
     let places: Vec<Place> = points.iter().map(|(p, n)| stations::snap(tracer, *p, *n)).collect();
     let mut solve = options.solve;
@@ -134,8 +143,11 @@ pub fn measure(
     solve.variation = solve.variation.min(options.error);
     solve.suit_method();
     solve.fit(tracer);
-    let mut gather = rays_for(options.error, 4096.0, 32, 16384);
-    let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 1024.0, 64, 8192) as u32 };
+    let wanted = rays_for(options.error, 4096.0, FEWEST_GATHERED, 16384);
+    // Within a time limit one comes to them step by step.
+    let mut gather = if monitor.deadline().is_some() { FEWEST_GATHERED } else { wanted };
+    let shadow_rays = rays_for(options.error, 1024.0, 64, 8192);
+    let mut shadowing = Shadowing { places: 1, rays: (shadow_rays * gather / wanted).max(16) as u32 };
     monitor.round(1, options.rounds + 1);
     let mut solution = Solution::new(tracer, &solve, monitor)?;
 
@@ -152,7 +164,14 @@ pub fn measure(
     let most_paths = most_paths(options.error).saturating_mul(closer);
     let mut rounds = Vec::new();
     loop {
-        let answer = solution.gathered(&places, gather, &shadowing, monitor)?;
+        let mut begun = Instant::now();
+        let mut answer = solution.gathered(&places, gather, &shadowing, monitor)?;
+        while gather < wanted && has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64()) {
+            gather *= 2;
+            shadowing.rays = (shadow_rays * gather / wanted).max(16) as u32;
+            begun = Instant::now();
+            answer = solution.gathered(&places, gather, &shadowing, monitor)?;
+        }
         let watched: Vec<Bands> = watched.iter().map(|&i| answer.irradiance[i]).collect();
         let audit =
             certify(&mut auditor, |auditor| auditor.judge(&watched), options.error, most_paths, &stages, monitor)?;
@@ -165,12 +184,15 @@ pub fn measure(
         let size = Some(smaller.unwrap_or(solution.element_size));
         let next = SolveOptions { element_size: size, rays: 2 * solution.rays(), ..solve };
         let fits = Solution::fits(tracer, &next);
-        if achieved || rounds.len() > options.rounds || places.is_empty() || !fits || is_stalled(&rounds) {
+        let is_last = achieved || rounds.len() > options.rounds || places.is_empty() || !fits || is_stalled(&rounds);
+        let out_of_time = !is_last && !has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64());
+        if is_last || out_of_time {
             stages.absorb(&solution.stages);
             return Ok(Measurement {
                 irradiance: answer.irradiance,
                 audit,
                 achieved,
+                out_of_time: !achieved && (out_of_time || is_over(monitor)),
                 rounds,
                 stages,
                 residual: solution.info.residual.clone(),
@@ -232,7 +254,7 @@ pub(crate) fn certify(
         loop {
             let audit = judge(auditor);
             let unsure = !audit.is_above(target) || auditor.paths() < least;
-            let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths;
+            let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths && !is_over(monitor);
             if !open {
                 return Ok(audit);
             }

@@ -17,6 +17,13 @@ pub trait Monitor: Sync {
     }
     /// Something worth saying between stages.
     fn note(&self, _text: &str) {}
+    /// When the answer so far will do; none for never. What is asked for then ends with what it has by that time: a whole
+    /// answer, with its error. It ends a little later, as it takes the first few rays of each element, the least that an audit
+    /// needs, and the writing, however late that is. How far it comes depends on the machine, and so do its bytes; all
+    /// else does not.
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
 }
 
 impl Monitor for () {}
@@ -27,6 +34,73 @@ pub(crate) struct Watch<'a>(pub &'a dyn Monitor);
 impl Progress for Watch<'_> {
     fn step(&self, done: usize, total: usize) -> bool {
         self.0.step(done, total)
+    }
+}
+
+/// Whether the answer so far has to do.
+pub(crate) fn is_over(monitor: &dyn Monitor) -> bool {
+    monitor.deadline().is_some_and(|deadline| Instant::now() >= deadline)
+}
+
+/// Whether there is time for what takes some seconds.
+pub(crate) fn has_time(monitor: &dyn Monitor, seconds: f64) -> bool {
+    monitor.deadline().is_none_or(|deadline| deadline.saturating_duration_since(Instant::now()).as_secs_f64() > seconds)
+}
+
+/// Hands a monitor to what may be left undone when its time is over.
+pub(crate) struct Hurry<'a>(pub &'a dyn Monitor);
+
+impl Progress for Hurry<'_> {
+    fn step(&self, done: usize, total: usize) -> bool {
+        self.0.step(done, total) && !is_over(self.0)
+    }
+}
+
+/// A monitor with a time limit.
+///
+/// ```
+/// use radiosity::{BakeOptions, Mesh, SolveOptions, Timed, Tracer, bake, cornell_box};
+/// use std::time::Duration;
+///
+/// let scene = cornell_box();
+/// let mesh = Mesh::new(&scene);
+/// let tracer = Tracer::new(&scene, &mesh);
+/// let solve = SolveOptions { element_size: Some(0.1), ..SolveOptions::default() };
+/// let options = BakeOptions { error: 1e-4, solve, ..BakeOptions::default() };
+/// let baked = bake(&tracer, &options, &Timed::new(&(), Duration::ZERO)).unwrap();
+/// assert!(baked.out_of_time && !baked.achieved && baked.audit.error < 1.0);
+/// ```
+pub struct Timed<'a> {
+    monitor: &'a dyn Monitor,
+    deadline: Instant,
+}
+
+impl<'a> Timed<'a> {
+    /// So long from now on.
+    pub fn new(monitor: &'a dyn Monitor, limit: std::time::Duration) -> Timed<'a> {
+        Timed { monitor, deadline: Instant::now() + limit }
+    }
+}
+
+impl Monitor for Timed<'_> {
+    fn round(&self, round: usize, most: usize) {
+        self.monitor.round(round, most);
+    }
+
+    fn stage(&self, name: &str) {
+        self.monitor.stage(name);
+    }
+
+    fn step(&self, done: usize, total: usize) -> bool {
+        self.monitor.step(done, total)
+    }
+
+    fn note(&self, text: &str) {
+        self.monitor.note(text);
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        Some(self.monitor.deadline().map_or(self.deadline, |deadline| deadline.min(self.deadline)))
     }
 }
 

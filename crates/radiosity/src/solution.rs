@@ -4,9 +4,10 @@
 //! X = (E − P) + R (D + S + F X), with D the direct irradiance and S the sky's, both known before the solve.
 
 use crate::Error;
+use crate::displayed::{Displayed, Screen, Shown};
 use crate::division::{Optics, Sheets, divided};
-use crate::equation::{self, Matrix};
-use crate::monitor::{Monitor, Stages, Watch};
+use crate::equation::{self, Matrix, RANDOM_TOLERANCE, TABLE_TOLERANCE, Task, single};
+use crate::monitor::{Hurry, Monitor, Stages, Watch, is_over};
 use radiosity_scene::{Bands, Elements, Scene, SkyPatches};
 use radiosity_solve::{DiffuseResponse, Info, Params, Solver};
 use radiosity_trace::Tracer;
@@ -37,8 +38,11 @@ pub struct SolveOptions {
     pub form_factors: Option<FormFactorMethod>,
     /// The solver.
     pub solver: Solver,
-    /// When it stops.
+    /// When it stops. Random solvers are better asked for [`RANDOM_TOLERANCE`](crate::RANDOM_TOLERANCE): see
+    /// [`SolveOptions::of`].
     pub params: Params,
+    /// Stops when what is displayed is near enough, whatever the residual.
+    pub displayed: Option<Displayed>,
     /// Largest size of the table of hit ids, bytes.
     pub memory: usize,
 }
@@ -54,6 +58,7 @@ impl Default for SolveOptions {
             form_factors: None,
             solver: Solver::DeflatedJacobi,
             params: Params { tolerance: 1e-4, ..Params::default() },
+            displayed: None,
             memory: 4 << 30,
         }
     }
@@ -65,7 +70,19 @@ const LEAST_RAYS: usize = 32;
 /// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
 const MATRIX_CELLS: usize = 2000;
 
+/// Rays per cell that are traced whether or not there is time: a tenth of a second for a room.
+const FIRST_RAYS: usize = 16;
+
 impl SolveOptions {
+    /// The default with a solver, and the residual that it is good for.
+    pub fn of(solver: Solver) -> SolveOptions {
+        let mut options = SolveOptions { solver, ..SolveOptions::default() };
+        if solver.is_random() {
+            options.params.tolerance = RANDOM_TOLERANCE;
+        }
+        options
+    }
+
     /// Fewer cells, and none of them divided, where a matrix grows with the square of the elements.
     pub(crate) fn suit_method(&mut self) {
         if self.form_factors.is_some() || self.solver.is_direct() {
@@ -84,6 +101,13 @@ impl SolveOptions {
         }
         let method = self.form_factors.map_or("rays", FormFactorMethod::name);
         Err(Error::Reciprocity { solver: self.solver, method })
+    }
+
+    /// Refuses a residual that single precision does not tell, before the work.
+    fn refuse_beyond_single_precision(&self) -> Result<(), Error> {
+        let is_applied = self.form_factors.is_none() && self.solver.applies_only() && self.displayed.is_none();
+        let (asked, least) = (self.params.tolerance, TABLE_TOLERANCE);
+        if is_applied && asked < least { Err(Error::Tolerance { asked, least }) } else { Ok(()) }
     }
 
     /// Refuses elimination of so many elements that its matrices are beyond the memory.
@@ -173,7 +197,7 @@ impl<'a> Solution<'a> {
     ///
     /// # Errors
     /// [`Error::Memory`] and [`Error::Elimination`] before anything large is allocated; [`Error::Reciprocity`];
-    /// [`Error::Transmission`]; [`Error::Stopped`].
+    /// [`Error::Transmission`]; [`Error::Tolerance`]; [`Error::Stopped`].
     pub fn begin(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         if mesh.triangles.is_empty() {
@@ -183,6 +207,7 @@ impl<'a> Solution<'a> {
         options.suit_method();
         let options = &options;
         options.refuse_unfit_solver(scene)?;
+        options.refuse_beyond_single_precision()?;
         let stages = Stages::default();
         let element_size = element_size(tracer, options);
         options.refuse_large_matrices(Elements::count(scene, mesh, element_size))?;
@@ -306,34 +331,77 @@ impl<'a> Solution<'a> {
         self.table.columns()
     }
 
-    /// Appends rays up to `rays` per cell and solves again from the solution so far.
+    /// Appends rays up to `rays` per cell and solves again from the solution so far. When the monitor's time is over, it ends
+    /// with what it has: fewer rays, perhaps ([`Solution::rays`]), and the iterate by then ([`Solution::info`]).
     ///
     /// # Errors
-    /// As [`Solution::new`].
+    /// As [`Solution::new`]; [`Error::Displayed`], [`Error::Tolerance`], [`Error::Time`].
     pub fn refine(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
         let needed = HitTable::bytes(self.elements.cells(), rays);
         if needed > self.options.memory {
             return Err(memory_error(self.elements.cells(), needed, &SolveOptions { rays, ..self.options }));
         }
-        let watch = Watch(monitor);
-        let mesh = self.tracer.mesh;
-        let ids = IdSpace { elements: &self.elements, sky: self.sky };
-        let receivers = ElementReceivers { mesh, elements: &self.elements, exposure: &self.exposure };
-        let table = &mut self.table;
-        let scene_sky = &self.tracer.scene.sky;
-        let sky = if scene_sky.is_black() { Vec::new() } else { self.sky.radiosity(scene_sky) };
-        self.stages.time(monitor, "rays", || table.extend(self.tracer, (&ids, &sky), &receivers, rays, &watch))?;
+        self.trace(rays, monitor)?;
         if let (Some(method), None) = (self.options.form_factors, &self.matrix) {
-            let matrix = self.stages.time(monitor, "form factors", || {
-                Matrix::new(method, mesh, &self.elements, self.options.memory, &watch)
-            })?;
-            self.matrix = Some(matrix);
+            let (mesh, memory) = (self.tracer.mesh, self.options.memory);
+            let found = self
+                .stages
+                .time(monitor, "form factors", || Matrix::new(method, mesh, &self.elements, memory, &Hurry(monitor)));
+            self.matrix = Some(found.map_err(|error| match error {
+                Error::Stopped if is_over(monitor) => Error::Time("the form factors"),
+                other => other,
+            })?);
         }
         let started = std::time::Instant::now();
         monitor.stage("solve");
         self.solve(monitor)?;
         self.stages.add("solve", started.elapsed().as_secs_f64());
         Ok(())
+    }
+
+    /// Appends rays up to `rays` per cell. Where there is a time limit they come in portions, each as many as there are, and
+    /// those that it does not leave time for are not there; sixteen always are.
+    fn trace(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
+        let ids = IdSpace { elements: &self.elements, sky: self.sky };
+        let mesh = self.tracer.mesh;
+        let receivers = ElementReceivers { mesh, elements: &self.elements, exposure: &self.exposure };
+        let scene_sky = &self.tracer.scene.sky;
+        let sky = if scene_sky.is_black() { Vec::new() } else { self.sky.radiosity(scene_sky) };
+        let (tracer, table) = (self.tracer, &mut self.table);
+        self.stages.time(monitor, "rays", || {
+            if monitor.deadline().is_none() {
+                return Ok(table.extend(tracer, (&ids, &sky), &receivers, rays, &Watch(monitor))?);
+            }
+            if table.columns() == 0 {
+                table.extend(tracer, (&ids, &sky), &receivers, FIRST_RAYS.min(rays), &Watch(monitor))?;
+            }
+            while table.columns() < rays && !is_over(monitor) {
+                let next = (2 * table.columns()).min(rays);
+                match table.extend(tracer, (&ids, &sky), &receivers, next, &Hurry(monitor)) {
+                    Err(_) if is_over(monitor) => break,
+                    done => done?,
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// How far what is displayed may be from what the solution of the same rows would be displayed as (catalogue 42); at the
+    /// exposure given, or that of a picture that shows all surfaces alike. Infinite before the first solve.
+    pub fn displayed(&self, exposure: Option<f64>) -> Shown {
+        let x: Vec<Bands> = self.values[..self.elements.len()].iter().map(|v| [v[0], v[1], v[2]]).collect();
+        let bound = if self.info.bound.is_empty() { &[f64::INFINITY; 3] } else { self.info.bound.as_slice() };
+        self.screen().shown(&x, bound, exposure)
+    }
+
+    /// B − X: what luminaires carry, E's part and ρ times what is read of their light beyond what the equation has.
+    fn screen(&self) -> Screen {
+        let apart = |i: usize| -> Bands {
+            let beyond = |i: usize, k: usize| self.columns.mean(i)[k] - self.columns.seen(i)[k];
+            let passed = |k: usize| self.sheets.passed(i).map_or(0.0, |(other, tau)| tau[k] * beyond(other, k));
+            std::array::from_fn(|k| self.luminaires.promoted[i][k] + self.reflectance[i][k] * beyond(i, k) + passed(k))
+        };
+        Screen { apart: (0..self.elements.len()).map(apart).collect(), weight: self.exposed_area() }
     }
 
     fn solve(&mut self, monitor: &dyn Monitor) -> Result<(), Error> {
@@ -361,21 +429,23 @@ impl<'a> Solution<'a> {
             bands: 3,
             reciprocal_area: reciprocal.then(|| self.area.clone()),
         });
-        let mut x: Vec<f64> = if self.info.steps > 0 {
+        // Where time may end the solver at once, the ambient term is a better start than none.
+        let mut x: Vec<f64> = if self.info.steps > 0 || monitor.deadline().is_some() {
             self.values[..n].iter().flat_map(|v| v[..3].iter().map(|v| f64::from(*v))).collect()
         } else {
             e.clone()
         };
-        self.info = equation::solve(
-            (&self.table, self.matrix.as_ref()),
-            &response,
-            (&e, &mut x),
-            (self.options.solver, &self.options.params),
-            monitor,
-        )?;
+        let screen = self.options.displayed.map(|asked| (self.screen(), asked));
+        let task = Task {
+            solver: self.options.solver,
+            params: &self.options.params,
+            displayed: screen.as_ref().map(|(screen, asked)| (screen, *asked)),
+        };
+        let operator = (&self.table, self.matrix.as_ref());
+        self.info = equation::solve(operator, &response, (&e, &mut x), &task, monitor)?;
 
-        for (value, x) in self.values.iter_mut().zip(x.chunks_exact(3)) {
-            *value = [x[0] as f32, x[1] as f32, x[2] as f32, 0.0];
+        for (value, [r, g, b]) in self.values.iter_mut().zip(single(&x)) {
+            *value = [r, g, b, 0.0];
         }
         let gathered = self.gathered_halves();
         let mean = |[a, b]: [[f32; 4]; 2], band: usize| 0.5 * (a[band] + b[band]);

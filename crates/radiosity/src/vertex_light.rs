@@ -8,6 +8,7 @@ use crate::answer::Station;
 use crate::bake::Baked;
 use crate::faces::{Face, faces, is_hidden, lit_vertex};
 use crate::judge::{Judge, STEP, WrittenRound, is_stalled, root_mean_square};
+use crate::monitor::is_over;
 use crate::{Error, Monitor, Solution, stations};
 use glam::DVec2;
 use radiosity_io::gltf_out::{Light, LitPrimitive};
@@ -55,7 +56,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
 
     let tolerance = baked.error * root_mean_square(solution);
     let most = MOST_VERTICES.min((solution.memory_allowed() / VERTEX_BYTES) as f64);
-    while rounds.len() <= ROUNDS && !is_stalled(&rounds) {
+    while rounds.len() <= ROUNDS && !is_stalled(&rounds) && !is_over(monitor) {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let lost = lattice.lost(solution, &faces, tolerance);
         let finer = |left: f64| finer(&faces, &lost, &division, left, most);

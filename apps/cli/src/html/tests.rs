@@ -4,7 +4,7 @@ use super::*;
 use crate::illuminance::{Class, Illuminance, SurfaceLight};
 use crate::report::{LightmapReport, SceneReport, SolutionReport, StageReport, TimeReport};
 use radiosity::measure::Round;
-use radiosity::{Balance, Faults};
+use radiosity::{Balance, Faults, Shown};
 
 fn example(rounds: usize) -> Report {
     let round = |i: usize| {
@@ -37,6 +37,7 @@ fn example(rounds: usize) -> Report {
         error: ErrorReport {
             asked: 0.01,
             achieved: upper <= 0.01,
+            out_of_time: false,
             estimated,
             upper_95_one_sided: upper,
             lower_95_one_sided: 0.8 * estimated,
@@ -88,6 +89,7 @@ fn example(rounds: usize) -> Report {
             steps: 14,
             relative_residual: vec![3.1e-6; 3],
             guaranteed_bound: vec![0.012, 0.011, 0.009],
+            displayed: Shown { delta_e: 0.7, exposure: -6.5 },
         },
         time: TimeReport {
             seconds: 41.5,
