@@ -58,7 +58,7 @@ impl RowMethod {
         match self {
             RowMethod::Hemicube => Box::new(Hemicube { look, weights: Weights::Exact }),
             RowMethod::HemicubeMidpoint => Box::new(Hemicube { look, weights: Weights::Midpoint }),
-            RowMethod::SinglePlane => Box::new(SinglePlane { look, ..SinglePlane::default() }),
+            RowMethod::SinglePlane => Box::new(SinglePlane::new(look)),
             RowMethod::CubicTetrahedron => Box::new(CubicTetrahedron { look }),
             RowMethod::GlobalCube => Box::new(GlobalCube { look, weights: Weights::Exact }),
             RowMethod::Hemisphere => Box::new(Hemisphere::like(&look)),

@@ -28,7 +28,7 @@ pub use hemisphere::Hemisphere;
 pub use look::{Look, Repair};
 pub use matrix::RowMatrix;
 pub use method::{RowMethod, UnknownRowMethod};
-pub use single_plane::SinglePlane;
+pub use single_plane::{HalfWidthError, SinglePlane};
 pub use surface::MOST_CELLS;
 
 use crate::pair::Factor;

@@ -18,13 +18,18 @@ use glam::DVec3;
 pub struct SinglePlane {
     /// How it is looked at; `resolution` is that of the plane.
     pub look: Look,
-    /// d: half the width over the height above the facet.
-    pub half_width: f64,
+    /// d: half the width over the height above the facet, finite and above zero.
+    half_width: f64,
     /// Sides close the gap between rim and horizon.
     pub sides: bool,
     /// Factors are divided by the share of the hemisphere that is captured.
     pub renormalise: bool,
 }
+
+/// A half width that makes no plane.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("a single plane is not {0} times as wide as it is high: use a finite number above 0")]
+pub struct HalfWidthError(pub f64);
 
 /// Half a width of 9 captures 99.0 %; twice that 99.8 %, at a quarter of the cells per solid angle.
 impl Default for SinglePlane {
@@ -34,15 +39,29 @@ impl Default for SinglePlane {
 }
 
 impl SinglePlane {
-    /// d within what makes a plane: a user's zero or NaN is the default.
-    fn d(&self) -> f64 {
-        if self.half_width.is_finite() && self.half_width > 0.0 { self.half_width } else { Self::default().half_width }
+    /// The default plane, looked at in a way.
+    pub fn new(look: Look) -> SinglePlane {
+        SinglePlane { look, ..SinglePlane::default() }
+    }
+
+    /// The same with another d: half the width over the height above the facet.
+    ///
+    /// # Errors
+    /// [`HalfWidthError`] for what makes no plane: zero, less, or no finite number.
+    pub fn with_half_width(self, half_width: f64) -> Result<SinglePlane, HalfWidthError> {
+        let is_plane = half_width.is_finite() && half_width > 0.0;
+        if is_plane { Ok(SinglePlane { half_width, ..self }) } else { Err(HalfWidthError(half_width)) }
+    }
+
+    /// d: half the width over the height above the facet.
+    pub fn half_width(&self) -> f64 {
+        self.half_width
     }
 
     /// Share of the hemisphere that the plane alone takes in.
     pub fn captured_by_plane(&self) -> f64 {
         // d/√(1+d²), written so that no square overflows.
-        let s = 1.0 / (1.0 / self.d()).hypot(1.0);
+        let s = 1.0 / (1.0 / self.half_width).hypot(1.0);
         4.0 / std::f64::consts::PI * s * s.atan()
     }
 }
@@ -53,7 +72,7 @@ impl Projection for SinglePlane {
     }
 
     fn faces(&self, n: usize) -> Vec<Face> {
-        let d = self.d();
+        let d = self.half_width;
         let mut faces = vec![Face { frame: [DVec3::X, DVec3::Y, DVec3::Z], window: [-d, d, -d, d], cells: [n, n] }];
         if self.sides {
             let rows = ((n as f64 / (2.0 * d)).ceil() as usize).clamp(2, 4 * n);
@@ -93,6 +112,15 @@ mod tests {
             assert!((plane.captured_by_plane() - share).abs() < 1e-4, "{half_width}");
             assert!((plane.captured_by_plane() - cells).abs() < 1e-12, "{half_width}");
         }
+    }
+
+    /// Zero and what is no number were taken for the default.
+    #[test]
+    fn widths_that_make_no_plane_are_refused() {
+        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(SinglePlane::default().with_half_width(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(SinglePlane::default().with_half_width(3.0).map(|plane| plane.half_width()), Ok(3.0));
     }
 
     /// In a cube the plane misses only what lies below its rim, says so, and may be completed in either way.
