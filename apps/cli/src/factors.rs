@@ -143,41 +143,48 @@ impl Arguments {
 
 fn read(arguments: &Arguments) -> Result<Input, Failure> {
     let options = LoadOptions { metres_per_unit: arguments.unit.unwrap_or(1.0), ..LoadOptions::default() };
+    let is_element = arguments.by() == By::Element;
     let grouping = match arguments.by() {
         By::Material => Grouping::Material,
         By::Object => Grouping::Object,
         By::Triangle | By::Element => Grouping::Triangle,
     };
     let title = arguments.scene.as_ref().map_or("built-in Cornell box".to_owned(), |s| s.display().to_string());
-    if arguments.by() == By::Element || arguments.scene.is_none() {
-        let (scene, mut faults) = match &arguments.scene {
-            None => (radiosity::cornell_box(), Faults::default()),
-            Some(path) => {
-                let loaded = radiosity::io::load(path, &options)?;
-                (loaded.scene, loaded.faults)
-            }
-        };
-        let enclosure = if arguments.by() == By::Element {
-            let Some(size) = arguments.element_size else {
-                return Err(Failure::input("--by element needs --element-size: width of elements in metres"));
-            };
-            let mesh = Mesh::new(&scene);
-            let count = Elements::count(&scene, &mesh, size);
-            if count.saturating_mul(ELEMENT) > arguments.memory {
-                return Err(Failure::input(format!(
-                    "{count} elements take more than the {} allowed (allow more, or use a larger --element-size)",
-                    radiosity::size(arguments.memory)
-                )));
-            }
-            let elements = Elements::new(&scene, &mesh, size);
-            Enclosure::of_elements(&mesh, &elements).map_err(Failure::input)?
-        } else {
-            enclosure_of(&scene, grouping, &title, &mut faults)
-        };
-        return Ok(Input { enclosure, vs3: None, faults, title });
+    if let (Some(path), false) = (&arguments.scene, is_element) {
+        let mut loaded = load_enclosure(path, &options, grouping)?;
+        let settings = loaded.vs3.as_ref().map_or((0, 0), |vs3| (vs3.settings.row, vs3.settings.col));
+        if settings != (0, 0) {
+            let (row, col) = settings;
+            let what = format!("row={row} col={col} ask for a row or a column alone");
+            loaded.faults.warning(title.clone(), what, "all rows and columns are found and written");
+        }
+        return Ok(Input { enclosure: loaded.enclosure, vs3: loaded.vs3, faults: loaded.faults, title });
     }
-    let loaded = load_enclosure(arguments.scene.as_deref().unwrap_or("".as_ref()), &options, grouping)?;
-    Ok(Input { enclosure: loaded.enclosure, vs3: loaded.vs3, faults: loaded.faults, title })
+    let (scene, mut faults) = match &arguments.scene {
+        None => (radiosity::cornell_box(), Faults::default()),
+        Some(path) => {
+            let loaded = radiosity::io::load(path, &options)?;
+            (loaded.scene, loaded.faults)
+        }
+    };
+    let enclosure = if is_element {
+        let Some(size) = arguments.element_size else {
+            return Err(Failure::input("--by element needs --element-size: width of elements in metres"));
+        };
+        let mesh = Mesh::new(&scene);
+        let count = Elements::count(&scene, &mesh, size);
+        if count.saturating_mul(ELEMENT) > arguments.memory {
+            return Err(Failure::input(format!(
+                "{count} elements take more than the {} allowed (allow more, or use a larger --element-size)",
+                radiosity::size(arguments.memory)
+            )));
+        }
+        let elements = Elements::new(&scene, &mesh, size);
+        Enclosure::of_elements(&mesh, &elements).map_err(Failure::input)?
+    } else {
+        enclosure_of(&scene, grouping, &title, &mut faults)
+    };
+    Ok(Input { enclosure, vs3: None, faults, title })
 }
 
 /// Runs the verb.
@@ -188,23 +195,28 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     if let Some(path) = &arguments.output {
         outputs.promise(path, &["npz", "mtx", "csv", "txt", "out"])?;
     }
+    let format = arguments.output.as_deref().and_then(FactorFormat::of);
     progress.part("reading");
     let input = read(arguments)?;
     for fault in input.faults.0.iter().filter(|f| f.severity > Severity::Note || global.verbose) {
         progress.say(&fault.to_string());
     }
-    let wants_script_f = arguments.script_f || input.vs3.as_ref().is_some_and(|v| v.settings.emit);
+    let is_script_f = arguments.script_f || input.vs3.as_ref().is_some_and(|v| v.settings.emit);
     let emittances: Option<Vec<f64>> = input.enclosure.surfaces.iter().map(|s| s.emittance).collect();
-    if wants_script_f && emittances.is_none() {
+    if is_script_f && emittances.is_none() {
         return Err(Failure::input("script-F needs an emittance for every surface: only .vs3 files give them"));
+    }
+    if is_script_f {
+        refuse_beyond(input.enclosure.surfaces.len(), SCRIPT_BYTES, "script-F", arguments.memory)?;
+    }
+    if let Some(FactorFormat::Npz) = format {
+        refuse_long_names(&input.enclosure)?;
     }
     progress.parts();
     let found = radiosity::factors(&input.enclosure, &arguments.options(), progress)?;
-    let table = Table::new(&input, &found, emittances, wants_script_f)?;
+    let table = Table::new(&input, &found, (emittances, is_script_f), arguments.memory)?;
 
-    if let Some(path) = &arguments.output {
-        // The ending was looked at when the file was promised.
-        let format = FactorFormat::of(path).unwrap_or(FactorFormat::Csv);
+    if let (Some(path), Some(format)) = (&arguments.output, format) {
         outputs.stage_with(path, |out| format.write(out, &table.borrowed()))?;
         outputs.commit()?;
     }
@@ -231,23 +243,61 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     Ok(())
 }
 
+/// Bytes of an entry of the full matrices that are made of factors to write them: a value and its error; twice that where
+/// masks are put in; for script-F the factors, what is eliminated, its two triangles and the result.
+const ENTRY_BYTES: usize = size_of::<f64>() + size_of::<f32>();
+const SCRIPT_BYTES: usize = 5 * size_of::<f64>();
+
+/// Refuses full matrices that are beyond the memory.
+fn refuse_beyond(surfaces: usize, entry: usize, what: &str, allowed: usize) -> Result<(), Failure> {
+    let needed = surfaces.saturating_mul(surfaces).saturating_mul(entry);
+    if needed <= allowed {
+        return Ok(());
+    }
+    let (needed, allowed) = (radiosity::size(needed), radiosity::size(allowed));
+    Err(Failure::input(format!(
+        "{what} of {surfaces} surfaces needs full matrices of {needed}, more than the {allowed} allowed (allow more by --memory)"
+    )))
+}
+
+/// Longest name that a .npz is written with: there all take as much as the longest, four bytes a character.
+const LONGEST_NAME: usize = 4096;
+
+/// Refuses names that would fill a .npz with nothing.
+fn refuse_long_names(enclosure: &Enclosure) -> Result<(), Failure> {
+    let lengths = enclosure.surfaces.iter().map(|surface| surface.name.chars().count());
+    match lengths.enumerate().find(|(_, length)| *length > LONGEST_NAME) {
+        Some((surface, length)) => Err(Failure::input(format!(
+            "the name of surface {} has {length} characters; a .npz pads all names to the longest, of {LONGEST_NAME} at most \
+             (write .csv or .mtx, or shorten it)",
+            surface + 1
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// The matrix that goes out.
-struct Table {
+struct Table<'a> {
     names: Vec<String>,
     areas: Vec<f64>,
     emittances: Option<Vec<f64>>,
-    matrix: Matrix,
+    matrix: Matrix<'a>,
     is_closed: bool,
     is_script_f: bool,
 }
 
-enum Matrix {
+enum Matrix<'a> {
     Dense(Vec<f64>, Option<Vec<f32>>),
-    Sparse(FormFactors),
+    Sparse(&'a FormFactors),
 }
 
-impl Table {
-    fn new(input: &Input, found: &Factors, emittances: Option<Vec<f64>>, is_script_f: bool) -> Result<Table, Failure> {
+impl<'a> Table<'a> {
+    fn new(
+        input: &Input,
+        found: &'a Factors,
+        (emittances, is_script_f): (Option<Vec<f64>>, bool),
+        memory: usize,
+    ) -> Result<Table<'a>, Failure> {
         let enclosure = &input.enclosure;
         let factors = &found.factors;
         let n = factors.len();
@@ -261,16 +311,17 @@ impl Table {
             is_closed,
             is_script_f,
         };
-        if is_script_f {
-            let emittances = emittances.unwrap_or_default();
-            let script = found.script_f(&emittances).map_err(Failure::input)?;
-            return Ok(table(Matrix::Dense(script, None), Some(emittances)));
+        if let (true, Some(emittances)) = (is_script_f, &emittances) {
+            let script = found.script_f(emittances).map_err(Failure::input)?;
+            return Ok(table(Matrix::Dense(script, None), Some(emittances.clone())));
         }
         let (share, from) = SPARSE;
         let has_masks = input.vs3.as_ref().is_some_and(|vs3| !vs3.masks.is_empty());
         if !has_masks && n >= from && (factors.values.len() as f64) < share * (n as f64).powi(2) {
-            return Ok(table(Matrix::Sparse(factors.clone()), emittances));
+            return Ok(table(Matrix::Sparse(factors), emittances));
         }
+        let entry = if has_masks { 2 * ENTRY_BYTES } else { ENTRY_BYTES };
+        refuse_beyond(n, entry, "the table", memory)?;
         let mut errors = vec![0f32; n * n];
         for i in 0..n {
             for (j, _, error) in factors.row(i) {
@@ -295,9 +346,11 @@ impl Table {
 
     /// Least and largest sum of a row as it goes out.
     fn row_sums(&self) -> [f64; 2] {
-        let Matrix::Dense(values, _) = &self.matrix else { return [f64::NAN; 2] };
-        let sums = values.chunks(self.names.len().max(1)).map(|row| row.iter().sum::<f64>());
-        sums.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], s| [low.min(s), high.max(s)])
+        let sums: Vec<f64> = match &self.matrix {
+            Matrix::Dense(values, _) => values.chunks(self.names.len().max(1)).map(|row| row.iter().sum()).collect(),
+            Matrix::Sparse(factors) => factors.row_sums(),
+        };
+        sums.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], s| [low.min(s), high.max(s)])
     }
 
     fn borrowed(&self) -> FactorTable<'_> {
