@@ -1,5 +1,6 @@
 //! `radiosity bake`: solve, write the lit model, a picture, a report.
 
+use crate::frames::{self, Frames};
 use crate::html::{self, Plate};
 use crate::input::{self, PictureArguments, SceneArguments, SolveArguments};
 use crate::output::{Outputs, print};
@@ -10,7 +11,7 @@ use crate::{Failure, Global, faults, numbers};
 use clap::{Args, ValueEnum};
 use radiosity::io::gltf_out::{Encoding, Style, lit_glb};
 use radiosity::io::image_out::encode_exr;
-use radiosity::{Camera, RenderOptions, Tracer, View, counted};
+use radiosity::{Camera, Monitor, RenderOptions, Tracer, View, counted};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bake`.
@@ -82,6 +83,9 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         }
         outputs.promise(path, &["png", "exr"])?;
     }
+    if let Some(folder) = &arguments.picture.frames {
+        frames::prepare(folder)?;
+    }
     progress.part("reading");
     let mut input = input::load(&arguments.scene, global, progress)?;
     if let Some(fault) = faults::sheets::warning(&input.scene, &input.title) {
@@ -103,7 +107,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     arguments.picture.warn_of_what_has_no_effect(wants_view, is_exposed, progress);
     // A camera that is not there is a fault even where none is needed.
     let needs_camera = wants_view
-       
+        || arguments.picture.frames.is_some()
         || arguments.picture.camera.is_some()
         || arguments.picture.eye.is_some();
     let camera = needs_camera.then(|| views::camera(&input.scene, &tracer, &arguments.picture)).transpose()?;
@@ -111,7 +115,10 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     progress.parts();
     arguments.solve.warn_of_loose_solver(progress);
     progress.limit(arguments.solve.time);
-    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), progress)?;
+    let frames = Frames::begin(&arguments.picture, (&tracer, camera.as_ref()), &arguments.solve.options(), progress)?;
+    let monitor: &dyn Monitor = frames.as_ref().map_or(progress, |frames| frames);
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), monitor)?;
+    frames.map_or(Ok(()), Frames::end)?;
 
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");

@@ -215,6 +215,10 @@ pub struct PictureArguments {
     /// Size; by the camera's aspect if left out.
     #[arg(long, value_parser = numbers::size, value_name = "WxH")]
     pub size: Option<(u32, u32)>,
+    /// A folder for pictures on the way, frame-000.png and so on, a quarter as wide: the first within moments, of coarse elements
+    /// before any ray goes between them, then one after each solve. They stay whatever becomes of the run.
+    #[arg(long, value_name = "DIR")]
+    pub frames: Option<PathBuf>,
     /// Exposure: log2 of the factor from cd/m² to display; chosen by itself if left out.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = numbers::exposure)]
     pub exposure: Option<f64>,
@@ -223,11 +227,12 @@ pub struct PictureArguments {
 impl PictureArguments {
     /// Tells of options that nothing depends on: all of them where no picture is made, the exposure where none is exposed.
     pub fn warn_of_what_has_no_effect(&self, is_made: bool, is_exposed: bool, progress: &Progress) {
+        let has_frames = self.frames.is_some();
         let given = [
-            ("--camera", self.camera.is_some(), is_made),
-            ("--eye", self.eye.is_some(), is_made),
-            ("--size", self.size.is_some(), is_made),
-            ("--exposure", self.exposure.is_some(), is_exposed),
+            ("--camera", self.camera.is_some(), is_made || has_frames),
+            ("--eye", self.eye.is_some(), is_made || has_frames),
+            ("--size", self.size.is_some(), is_made || has_frames),
+            ("--exposure", self.exposure.is_some(), is_exposed || has_frames),
         ];
         for (option, ..) in given.iter().filter(|(_, given, acts)| *given && !acts) {
             let why = if is_made { "EXR holds cd/m² as they are" } else { "no picture is asked for" };

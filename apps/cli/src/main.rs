@@ -6,6 +6,7 @@ mod compare;
 mod factors;
 mod faults;
 mod figures;
+mod frames;
 mod html;
 mod illuminance;
 mod input;
@@ -27,7 +28,7 @@ use std::process::ExitCode;
 ///
 /// SCENE is a .glb, .gltf or .obj file (`factors`: or a View3D .vs3); without one the built-in Cornell box is used. Lengths in metres, light in
 /// cd/m², lm and lx. Exit code 0: done; 1: the work failed; 2: the call or the input was wrong; 130: interrupted.
-/// Files are written whole and all together at the end; a run that fails or is interrupted leaves none.
+/// Files are written whole and all together at the end; a run that fails or is interrupted leaves none (but `--frames`).
 #[derive(Parser)]
 #[command(name = "radiosity", version)]
 struct Cli {

@@ -151,6 +151,15 @@ impl Drop for Outputs {
     }
 }
 
+/// Writes a file at once, in place of what may be there: whole, or not at all.
+pub fn write_now(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let staged = begin(path);
+    let beside = staged.beside().to_owned();
+    let written = staged.write(bytes).and_then(|()| staged.place());
+    temporary().retain(|t| *t != beside);
+    written.map_err(|error| unwritten(path, &error))
+}
+
 fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
     Failure::work(format!("{}: cannot be written: {error}", path.display()))
 }

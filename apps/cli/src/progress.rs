@@ -155,6 +155,20 @@ impl Progress {
         }
     }
 
+    /// A line for the user that events have in their own way.
+    pub fn line(&self, text: &str) {
+        if !self.json {
+            self.say(text);
+        }
+    }
+
+    /// An event, where events are asked for.
+    pub fn event(&self, event: &serde_json::Value) {
+        if self.json {
+            self.tell(event);
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, Stage> {
         self.stage.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -230,6 +244,10 @@ impl Monitor for Progress {
     fn deadline(&self) -> Option<Instant> {
         let seconds = f64::from_bits(self.limit.load(Ordering::Relaxed));
         seconds.is_finite().then(|| self.start + Duration::from_secs_f64(seconds))
+    }
+
+    fn warn(&self, text: &str) {
+        self.say(&format!("note: {text}"));
     }
 
     fn note(&self, text: &str) {

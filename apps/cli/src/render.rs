@@ -1,12 +1,13 @@
 //! `radiosity render`: a picture from the solution.
 
+use crate::frames::{self, Frames};
 use crate::input::{self, PictureArguments, SceneArguments, SolveArguments};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::report::ErrorReport;
 use crate::{Failure, Global, views};
 use clap::Args;
-use radiosity::{RenderOptions, Tracer};
+use radiosity::{Monitor, RenderOptions, Tracer};
 use std::path::PathBuf;
 
 /// Arguments of `render`.
@@ -27,6 +28,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let mut outputs = Outputs::new(&arguments.scene.files());
     outputs.promise(&arguments.output, &["png", "exr"])?;
+    if let Some(folder) = &arguments.picture.frames {
+        frames::prepare(folder)?;
+    }
     progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
     outputs.spare(&input.files)?;
@@ -37,7 +41,10 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     progress.parts();
     arguments.solve.warn_of_loose_solver(progress);
     progress.limit(arguments.solve.time);
-    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), progress)?;
+    let frames = Frames::begin(&arguments.picture, (&tracer, Some(&camera)), &arguments.solve.options(), progress)?;
+    let monitor: &dyn Monitor = frames.as_ref().map_or(progress, |frames| frames);
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), monitor)?;
+    frames.map_or(Ok(()), Frames::end)?;
     progress.part("picture");
     let (width, height) = views::picture_size(&camera, arguments.picture.size);
     let render = RenderOptions { width, height, ..RenderOptions::default() };

@@ -112,6 +112,10 @@ pub(crate) fn divided(
     variation: f64,
     progress: &impl Progress,
 ) -> Result<Elements, Stopped> {
+    // Nothing is asked of light that may vary as it likes, and looking takes seconds in a furnished room.
+    if variation == f64::INFINITY {
+        return Ok(cells);
+    }
     let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &cells);
     let luminaires = Luminaires::new(tracer.scene, tracer.mesh, &cells, &area, &exitance);
     // Nothing is known yet of what is buried; such places drop out one by one.

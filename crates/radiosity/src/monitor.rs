@@ -1,5 +1,6 @@
 //! Watching a run from outside: which stage it is in, how far it has come, whether it should go on.
 
+use crate::Solution;
 use radiosity_transport::Progress;
 use serde::Serialize;
 use std::sync::Mutex;
@@ -17,6 +18,10 @@ pub trait Monitor: Sync {
     }
     /// Something worth saying between stages.
     fn note(&self, _text: &str) {}
+    /// Something that whoever waits should know.
+    fn warn(&self, _text: &str) {}
+    /// A whole solution is there: the first before any row is traced, then after each solve.
+    fn solved(&self, _solution: &Solution) {}
     /// When the answer so far will do; none for never. What is asked for then ends with what it has by that time: a whole
     /// answer, with its error. It ends a little later, as it takes the first few rays of each element, the least that an audit
     /// needs, and the writing, however late that is. How far it comes depends on the machine, and so do its bytes; all
@@ -97,6 +102,14 @@ impl Monitor for Timed<'_> {
 
     fn note(&self, text: &str) {
         self.monitor.note(text);
+    }
+
+    fn warn(&self, text: &str) {
+        self.monitor.warn(text);
+    }
+
+    fn solved(&self, solution: &Solution) {
+        self.monitor.solved(solution);
     }
 
     fn deadline(&self) -> Option<Instant> {

@@ -263,6 +263,7 @@ impl<'a> Solution<'a> {
             indirect: vec![[0.0; 3]; n],
         };
         solution.spread_ambient();
+        monitor.solved(&solution);
         Ok(solution)
     }
 
@@ -356,6 +357,7 @@ impl<'a> Solution<'a> {
         monitor.stage("solve");
         self.solve(monitor)?;
         self.stages.add("solve", started.elapsed().as_secs_f64());
+        monitor.solved(self);
         Ok(())
     }
 

@@ -1,6 +1,8 @@
 //! `radiosity render`.
 
 use crate::{COARSE, Room};
+use serde_json::Value;
+use std::fs;
 
 #[test]
 fn a_picture_is_the_same_by_render_and_by_bake() {
@@ -45,4 +47,57 @@ fn the_eye_is_put_where_it_is_asked() {
         room.read("a.png")
     });
     assert!(pictures[1] == pictures[0] && pictures[2] != pictures[0] && pictures[3] != pictures[0]);
+}
+
+/// Pictures on the way are whole, small and many; the one at the end has the bytes that it has without them.
+#[test]
+fn catalogue_43_pictures_on_the_way_change_nothing_at_the_end() {
+    let room = Room::new("frames");
+    let call = |name: &'static str| [&["render", "-o", name, "--json"], &COARSE[..]].concat();
+    room.run(call("plain.png")).result();
+    let run = room.run([&call("shown.png")[..], &["--frames", "way"]].concat());
+    run.result();
+    assert!(room.read("plain.png") == room.read("shown.png"));
+    let frames: Vec<Value> = run.events().into_iter().filter(|event| event["event"] == "frame").collect();
+    let rays: Vec<u64> = frames.iter().filter_map(|frame| frame["rays"].as_u64()).collect();
+    // A coarse one before any ray, then twice as many each time; then the solution itself, before and after its rays.
+    assert!(rays.len() >= 6 && rays[..5] == [0, 16, 32, 64, 0], "{rays:?}");
+    let seconds: Vec<f64> = frames.iter().filter_map(|frame| frame["seconds"].as_f64()).collect();
+    assert!(seconds.is_sorted(), "{seconds:?}");
+    for (number, frame) in frames.iter().enumerate() {
+        let name = format!("way/frame-{number:03}.png");
+        let bytes = room.read(&name);
+        assert_eq!(frame["output"], name.as_str());
+        // Width and height in the first chunk of a PNG, and its end.
+        assert_eq!(
+            (&bytes[16..24], &bytes[bytes.len() - 8..bytes.len() - 4]),
+            (&[0, 0, 0, 12, 0, 0, 0, 12][..], &b"IEND"[..])
+        );
+    }
+    assert_eq!(fs::read_dir(room.0.join("way")).unwrap().count(), frames.len(), "no temporary file is left");
+
+    let again = room.run([&call("shown.png")[..], &["--frames", "way"]].concat());
+    assert!(again.code == Some(2) && again.err.contains("has frames of another run"), "{again:?}");
+    let said = room.run([&["render", "-o", "a.png", "--frames", "other"], &COARSE[..]].concat());
+    assert!(said.err.contains("first picture after ") && said.err.contains("frame-000.png"), "{said:?}");
+}
+
+/// Time that is over is told beside the error, and what there is by then is written.
+#[test]
+fn a_limit_of_time_and_nearness_on_the_display_are_told() {
+    let room = Room::new("limits");
+    let few = ["--size", "32x32", "--element-size", "0.1"];
+    let run = room.run([&["render", "-o", "a.png", "--error", "0.01%", "--time", "1s", "--json"], &few[..]].concat());
+    let error = &run.result()["error"];
+    assert_eq!((&error["achieved"], &error["out_of_time"]), (&false.into(), &true.into()), "{error}");
+    let said = room.run([&["render", "-o", "b.png", "--error", "0.01%", "--budget", "1s"], &few[..]].concat());
+    assert!(said.code == Some(0) && said.err.contains("NOT reached, as the time was over"), "{said:?}");
+    assert_eq!(room.names(), ["a.png", "b.png"]);
+
+    let near = ["--error", "20%", "--delta-e", "2", "--exposure", "-6"];
+    let told = room.run([&["render", "-o", "c.png", "--json"], &few[..], &near].concat()).result();
+    let delta_e = told["displayed"]["delta_e"].as_f64().unwrap();
+    assert!(delta_e > 0.0 && delta_e <= 2.0 && told["displayed"]["exposure"] == -6.0, "{told}");
+    let said = room.run([&["render", "-o", "d.png"], &few[..], &near].concat());
+    assert!(said.err.contains("what is displayed is within ΔE "), "{said:?}");
 }
