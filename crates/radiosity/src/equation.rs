@@ -13,6 +13,7 @@ use radiosity_solve::{
 };
 use radiosity_transport::view_factors::ViewFactorOptions;
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors, HitTable, Progress};
+use std::time::Instant;
 
 /// Accuracy of adaptive factors. Light is asked for to a percent or so, and a row has hundreds of entries that err either
 /// way.
@@ -65,6 +66,22 @@ struct Way {
     sweeps: f64,
     first: Option<f64>,
     done: usize,
+    begun: Instant,
+    /// Whether it has been told how long it takes.
+    is_told: bool,
+}
+
+/// Seconds after which a solver's speed is known, and what it may then take without being told of.
+const KNOWN: f64 = 1.0;
+const SHORT: f64 = 30.0;
+
+/// Seconds as people say them.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 100.0 => format!("{s:.0} s"),
+        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.0} h", s / 3600.0),
+    }
 }
 
 impl Way {
@@ -72,7 +89,18 @@ impl Way {
         let mean = reflectance.iter().sum::<f64>() / reflectance.len().max(1) as f64;
         // Light that hardly comes to rest is expected to take a hundred sweeps or so.
         let sweeps = tolerance.ln() / mean.clamp(0.1, 0.9).ln();
-        Way { is_random, tolerance, sweeps, first: None, done: 0 }
+        Way { is_random, tolerance, sweeps, first: None, done: 0, begun: Instant::now(), is_told: false }
+    }
+
+    /// The seconds that a solver is going to take, told once, in its first seconds, if they are many: by the work so far, of
+    /// that which light with this reflectance needs. Random methods take what their noise needs, which nobody knows.
+    fn slow(&mut self, info: &Info) -> Option<f64> {
+        let passed = self.begun.elapsed().as_secs_f64();
+        if self.is_told || self.is_random || passed < KNOWN || info.work <= 0.0 {
+            return None;
+        }
+        self.is_told = true;
+        Some(passed * (self.sweeps / info.work - 1.0)).filter(|seconds| *seconds > SHORT)
     }
 
     /// Parts of [`PARTS`] done, never fewer than before, as a residual may rise for a while.
@@ -132,6 +160,13 @@ pub(crate) fn solve(
     let step = |x: &[f64], info: &Info| {
         if !monitor.step(way.done(info), PARTS) {
             return Go::Stop;
+        }
+        if let Some(seconds) = way.slow(info) {
+            monitor.warn(&format!(
+                "{solver} will take about {} for {} elements; deflated-jacobi, the default, takes moments",
+                duration(seconds),
+                x.len() / 3
+            ));
         }
         if is_over(monitor) && (info.work >= FIRST_SWEEPS || !solver.applies_only()) {
             return Go::Enough;
