@@ -1,51 +1,13 @@
 //! What holds for every method of form factors: sums of rows, unequal areas, grouping, and agreement past obstacles.
 
+mod rooms;
+
 use glam::DVec3;
-use radiosity_scene::{Enclosure, Facet};
+use radiosity_scene::Enclosure;
 use radiosity_transport::row::Look;
 use radiosity_transport::view_factors::ViewFactorOptions;
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors, PairMethod};
-
-fn rectangle([corner, u, v]: [DVec3; 3]) -> Facet {
-    Facet::new(vec![corner, corner + u, corner + u + v, corner + v]).unwrap()
-}
-
-/// Adds a rectangle cut into k × k.
-fn add_cut(enclosure: &mut Enclosure, k: usize, [corner, u, v]: [DVec3; 3]) {
-    let n = k as f64;
-    for i in 0..k * k {
-        let at = corner + u * ((i % k) as f64 / n) + v * ((i / k) as f64 / n);
-        enclosure.add(format!("{i}"), rectangle([at, u / n, v / n]));
-    }
-}
-
-/// Floor, ceiling, then the walls of a box from the origin, each cut into k × k, active inside.
-fn box_of(size: DVec3, k: usize) -> Enclosure {
-    let [x, y, z] = [DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z];
-    let mut room = Enclosure { is_closed: true, ..Enclosure::default() };
-    for face in [[DVec3::ZERO, x, y], [z, y, x], [DVec3::ZERO, y, z], [x, z, y], [DVec3::ZERO, z, x], [y, x, z]] {
-        add_cut(&mut room, k, face);
-    }
-    room
-}
-
-/// A room of 2 × 1.5 × 1 with a block that stands turned in the middle, its six faces last.
-fn room_with_block(k: usize) -> Enclosure {
-    let mut room = box_of(DVec3::new(2.0, 1.5, 1.0), k);
-    let (u, v) = (DVec3::new(0.4, 0.15, 0.0), DVec3::new(-0.15, 0.4, 0.0));
-    let (corner, up) = (DVec3::new(0.85, 0.5, 0.25), DVec3::Z * 0.5);
-    for [at, a, b] in [
-        [corner, v, u],
-        [corner + up, u, v],
-        [corner, u, up],
-        [corner + u, v, up],
-        [corner + u + v, -u, up],
-        [corner + v, -v, up],
-    ] {
-        add_cut(&mut room, 1, [at, a, b]);
-    }
-    room
-}
+use rooms::{box_of, rectangle, room_with_block};
 
 fn options(resolution: usize) -> FormFactorOptions {
     let look = Look { resolution, points: 2, ..Look::default() };
@@ -69,8 +31,8 @@ fn is_random(method: FormFactorMethod) -> bool {
 #[test]
 fn catalogue_0a_unequal_areas_in_every_method() {
     let mut pair = Enclosure::default();
-    pair.add("large", rectangle([DVec3::ZERO, DVec3::X * 10.0, DVec3::Y * 10.0]));
-    pair.add("small", rectangle([DVec3::new(4.5, 4.5, 5.0), DVec3::Y, DVec3::X]));
+    pair.add("large", rectangle(DVec3::ZERO, DVec3::X * 10.0, DVec3::Y * 10.0));
+    pair.add("small", rectangle(DVec3::new(4.5, 4.5, 5.0), DVec3::Y, DVec3::X));
     let exact = FormFactors::new(FormFactorMethod::Adaptive, &pair, &options(64), &()).unwrap();
     let (up, down) = (exact.value(0, 1), exact.value(1, 0));
     assert!((down / up - 100.0).abs() < 1e-11 && down > 0.5 && up < 0.01, "{up} {down}");

@@ -127,7 +127,7 @@ mod tests {
     /// Sums of the same pixels, in another order, come out the same to the last bit.
     #[test]
     fn catalogue_27_directional_factors_sum_to_the_diffuse_one() {
-        let room = room_with_block();
+        let room = room_with_block(2);
         for (points, side) in [(1, 1), (1, 8), (2, 5)] {
             let cube = GlobalCube { look: Look { resolution: 64, points, ..Look::default() }, ..GlobalCube::default() };
             for from in [0, 5, 9] {

@@ -186,7 +186,7 @@ mod tests {
     /// Closed rooms lose nothing, and the errors stated are met.
     #[test]
     fn catalogue_28_rows_of_closed_rooms_sum_to_one() {
-        let room = room_with_block();
+        let room = room_with_block(2);
         let rays = Hemisphere { rays: 4096, ..Hemisphere::default() };
         let matrix = rays.rows(&room, &()).unwrap();
         for i in 0..matrix.len() {

@@ -5,6 +5,11 @@ use glam::DVec3;
 use radiosity_scene::Facet;
 use std::f64::consts::PI;
 
+#[path = "../../tests/rooms/mod.rs"]
+mod rooms;
+use rooms::{add_cut, rectangle};
+pub(super) use rooms::{box_of, room_with_block};
+
 /// Faces of a unit cube (catalogue 20).
 pub(super) const OPPOSITE: f64 = 0.199_824_895_7;
 pub(super) const ADJACENT: f64 = 0.200_043_776_1;
@@ -22,48 +27,6 @@ fn face_to_face(a: f64, b: f64, c: f64) -> f64 {
     let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
     let logarithm = (p * p * q * q / (1.0 + x * x + y * y)).sqrt().ln();
     2.0 / (PI * x * y) * (logarithm + x * q * (x / q).atan() + y * p * (y / p).atan() - x * x.atan() - y * y.atan())
-}
-
-/// The rectangle from `corner` along u and v; its active side is that of u × v.
-fn rectangle(corner: DVec3, u: DVec3, v: DVec3) -> Facet {
-    Facet::new(vec![corner, corner + u, corner + u + v, corner + v]).unwrap()
-}
-
-/// Adds a rectangle cut into k × k.
-fn add_cut(enclosure: &mut Enclosure, k: usize, [corner, u, v]: [DVec3; 3]) {
-    let n = k as f64;
-    for i in 0..k * k {
-        let at = corner + u * ((i % k) as f64 / n) + v * ((i / k) as f64 / n);
-        enclosure.add(format!("{i}"), rectangle(at, u / n, v / n));
-    }
-}
-
-/// Floor, ceiling, then the walls of a box from the origin, each cut into k × k, active inside.
-pub(super) fn box_of(size: DVec3, k: usize) -> Enclosure {
-    let [x, y, z] = [DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z];
-    let mut room = Enclosure { is_closed: true, ..Enclosure::default() };
-    for face in [[DVec3::ZERO, x, y], [z, y, x], [DVec3::ZERO, y, z], [x, z, y], [DVec3::ZERO, z, x], [y, x, z]] {
-        add_cut(&mut room, k, face);
-    }
-    room
-}
-
-/// A room of 2 × 1.5 × 1, cut into 2 × 2, with a block that stands turned in the middle.
-pub(super) fn room_with_block() -> Enclosure {
-    let mut room = box_of(DVec3::new(2.0, 1.5, 1.0), 2);
-    let (u, v) = (DVec3::new(0.4, 0.15, 0.0), DVec3::new(-0.15, 0.4, 0.0));
-    let (corner, up) = (DVec3::new(0.85, 0.5, 0.25), DVec3::Z * 0.5);
-    for [at, a, b] in [
-        [corner, v, u],
-        [corner + up, u, v],
-        [corner, u, up],
-        [corner + u, v, up],
-        [corner + u + v, -u, up],
-        [corner + v, -v, up],
-    ] {
-        add_cut(&mut room, 1, [at, a, b]);
-    }
-    room
 }
 
 /// An L of two rooms, floor and ceiling concave.
@@ -122,7 +85,7 @@ fn catalogue_91_all_surfaces_agree_in_a_cube() {
 
 #[test]
 fn catalogue_91_all_surfaces_agree_around_a_block() {
-    all_agree(&room_with_block(), Look { resolution: 64, points: 2, ..Look::default() });
+    all_agree(&room_with_block(2), Look { resolution: 64, points: 2, ..Look::default() });
 }
 
 #[test]
@@ -134,7 +97,7 @@ fn catalogue_91_all_surfaces_agree_around_a_corner() {
 /// eye points.
 #[test]
 fn predicted_errors_cover_the_true_ones() {
-    let room = room_with_block();
+    let room = room_with_block(2);
     let reference = Hemisphere { rays: 1 << 16, seed: 7, ..Hemisphere::default() }.rows(&room, &()).unwrap();
     for points in [1, 2, 4] {
         for method in RowMethod::all() {
@@ -213,7 +176,7 @@ fn rows_do_not_depend_on_threads() {
             done < self.0
         }
     }
-    let room = room_with_block();
+    let room = room_with_block(2);
     let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
     for method in RowMethod::all() {
         let row = method.with(Look { resolution: 16, spin: Some(5), ..Look::default() });
