@@ -158,3 +158,23 @@ fn an_accuracy_that_was_not_reached_and_rows_above_one_are_warned_of() {
         "{twice:?}"
     );
 }
+
+/// All rows went out in silence; matrices for writing were no part of the memory; a name filled a .npz with zeros.
+#[test]
+fn what_factors_do_not_do_is_told() {
+    let room = Room::new("factors-told");
+    room.write("row.vs3", &SQUARES.replace("F 3\n", "F 3\nC row=1\n"));
+    let run = room.run(["factors", "row.vs3"]);
+    assert!(run.code == Some(0) && run.err.contains("warning: row.vs3: row=1 col=0"), "{run:?}");
+    room.write("squares.vs3", SQUARES);
+    let run = room.run(["factors", "squares.vs3"]);
+    assert!(run.code == Some(0) && !run.err.contains("warning"), "{run:?}");
+    let run = room.run(["factors", "squares.vs3", "--script-f", "--memory", "0.1K"]);
+    assert!(run.code == Some(2) && run.err.contains("script-F of 2 surfaces needs full matrices"), "{run:?}");
+
+    let name = "n".repeat(5000);
+    room.write("long.obj", &format!("v 0 0 0\nv 1 0 0\nv 0 1 0\no {name}\nf 1 2 3\n"));
+    let run = room.run(["factors", "long.obj", "-o", "f.npz"]);
+    assert!(run.code == Some(2) && run.err.contains("has 5000 characters"), "{run:?}");
+    assert_eq!(room.run(["factors", "long.obj", "-q", "-o", "f.csv"]).code, Some(0));
+}
