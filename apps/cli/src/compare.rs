@@ -24,7 +24,8 @@ pub struct Arguments {
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = solver)]
     solvers: Vec<Solver>,
     /// Time to spend, such as 60s or 5min; what would take too long is left out and named.
-    #[arg(long, alias = "time", default_value = "60s", value_name = "TIME", allow_hyphen_values = true, value_parser = numbers::seconds)]
+    #[arg(long, alias = "time", default_value = "60s", value_name = "TIME", allow_hyphen_values = true,
+        value_parser = numbers::seconds)]
     budget: f64,
     /// About how many elements to cut the surfaces into; each triangle is one at least.
     #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1_000_000))]
