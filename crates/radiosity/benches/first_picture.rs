@@ -3,7 +3,7 @@
 //! The built-in Cornell box, or the files named: `cargo bench -p radiosity --bench first_picture -- FILE...`. Pictures are
 //! those of `render --frames` at its usual size, a quarter of 1280 x 720 pixels.
 
-#![allow(clippy::print_stdout)] // A report is what this is for.
+#![expect(clippy::print_stdout, reason = "the result of a bench is what it prints")]
 
 use radiosity::io::{LoadOptions, load};
 use radiosity::{Glimpse, Mesh, Monitor, Scene, Solution, SolveOptions, Tracer, cornell_box, place_camera, preview};
