@@ -229,8 +229,8 @@ fn catalogue_42_what_is_asked_for_is_kept() {
 /// enough is the one that is handed out, and it took no more work than a residual of 1e-13.
 #[test]
 fn catalogue_42_a_callback_ends_a_solver_by_any_criterion() {
-    let criteria: [(&str, fn(&Info) -> f64); 2] =
-        [("bound", |info| info.bound[0]), ("unshot", |info| info.unshot[0].abs())];
+    type Left = fn(&Info) -> f64;
+    let criteria: [(&str, Left); 2] = [("bound", |info| info.bound[0]), ("unshot", |info| info.unshot[0].abs())];
     for system in [cube(0.8), room(3)] {
         let exact = system.exact();
         for solver in certain().filter(|solver| !solver.is_direct()) {
