@@ -9,6 +9,7 @@ use super::body::{Line, Occluder};
 pub(crate) use crate::polygon::point_to_polygon_above as lambert;
 use glam::DVec3;
 use smallvec::SmallVec;
+use std::ops::Range;
 
 /// A convex polygon on its way through the cuts.
 pub type Loop = SmallVec<[DVec3; 10]>;
@@ -20,17 +21,35 @@ const ROUNDING: f64 = 1e-12;
 /// work, and what they leave is cut into pieces.
 const FEW: usize = 8;
 
-/// What a panel hides from a point: all that has positive heights over these planes.
-type Shadow = SmallVec<[(DVec3, f64); 8]>;
+/// A plane: a normal n, and n · x of its points.
+type Plane = (DVec3, f64);
 
 /// An odd number whose multiples mix bits.
 const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// The shadows of panels as a point throws them.
-#[derive(Default)]
+/// The shadows of bodies as a point throws them: each is all that has positive heights over some planes.
 pub struct Shadows {
-    of: Vec<Shadow>,
-    bodies: Vec<u16>,
+    /// The planes of all, one shadow after another.
+    planes: Vec<Plane>,
+    /// The body of each, and its planes.
+    of: Vec<(u16, Range<usize>)>,
+    /// What is cut, for shadows of shadows of shadows.
+    clips: [Clip; FEW + 1],
+}
+
+impl Default for Shadows {
+    fn default() -> Self {
+        Shadows { planes: Vec::new(), of: Vec::new(), clips: std::array::from_fn(|_| Clip::default()) }
+    }
+}
+
+/// A polygon on its way through cuts; kept to be used again.
+#[derive(Default)]
+struct Clip {
+    part: Vec<DVec3>,
+    next: Vec<DVec3>,
+    /// Heights of the corners over one plane after another.
+    heights: Vec<f64>,
 }
 
 /// What a point sees of a polygon past bodies.
@@ -61,26 +80,27 @@ impl Shadows {
         touch: f64,
     ) -> Sight {
         self.of.clear();
-        self.bodies.clear();
-        for (k, occluder) in occluders {
-            if let Some(shadow) = shadow(x, occluder, touch) {
-                self.of.push(shadow);
-                self.bodies.push(k);
+        self.planes.clear();
+        for (body, occluder) in occluders {
+            let start = self.planes.len();
+            if throw(x, occluder, touch, &mut self.planes) {
+                self.of.push((body, start..self.planes.len()));
             }
         }
+        let Shadows { planes, of, clips: [clip, clips @ ..] } = self;
         let (mut is_whole, mut hidden_all, mut hiding) = (true, 0.0, 0u64);
-        let are_many = self.of.len() > FEW;
-        for (k, shadow) in self.of.iter().enumerate() {
-            match within(target, shadow) {
+        let are_many = of.len() > FEW;
+        for (k, (body, range)) in of.iter().enumerate() {
+            match within(target, &planes[range.clone()], clip) {
                 Within::None => {}
-                Within::All => return Sight::Nothing(self.bodies[k]),
-                Within::Part(part, how) => {
+                Within::All => return Sight::Nothing(*body),
+                Within::Part(how) => {
                     is_whole = false;
                     if !are_many {
-                        let own = lambert(x, normal, &part);
-                        hidden_all += own - hidden(x, normal, &part, own, &self.of[..k]);
+                        let own = lambert(x, normal, &clip.part);
+                        hidden_all += own - hidden((x, normal), &clip.part, own, (&of[..k], planes), clips);
                     }
-                    hiding = (hiding ^ how ^ u64::from(self.bodies[k]) << 48).wrapping_mul(MIX).rotate_left(29);
+                    hiding = (hiding ^ how ^ u64::from(*body) << 48).wrapping_mul(MIX).rotate_left(29);
                 }
             }
         }
@@ -89,36 +109,37 @@ impl Shadows {
         }
         let whole = lambert(x, normal, target);
         if are_many {
-            hidden_all = whole - left(target, &self.of).iter().map(|piece| lambert(x, normal, piece)).sum::<f64>();
+            let left = left(target, of.iter().map(|(_, range)| &planes[range.clone()]), clip);
+            hidden_all = whole - left.iter().map(|piece| lambert(x, normal, piece)).sum::<f64>();
         }
         Sight::Partly { factors: [(whole - hidden_all).max(0.0), hidden_all], hiding }
     }
 }
 
-/// The shadow that an occluder throws as seen from x; none if x does not lie before it.
-fn shadow(x: DVec3, occluder: &Occluder, touch: f64) -> Option<Shadow> {
+/// Adds the planes of the shadow that an occluder throws as seen from x; whether x lies before it.
+fn throw(x: DVec3, occluder: &Occluder, touch: f64, planes: &mut Vec<Plane>) -> bool {
     if !occluder.faces.iter().any(|(beyond, offset)| beyond.dot(x) < offset - touch) {
-        return None;
+        return false;
     }
-    let mut planes: Shadow = occluder.cuts.iter().copied().collect();
-    for Line { ends: [p, q], .. } in &occluder.edges {
+    planes.extend_from_slice(&occluder.cuts);
+    planes.extend(occluder.edges.iter().map(|Line { ends: [p, q], .. }| {
         let normal = (*q - x).cross(*p - x);
-        planes.push((normal, normal.dot(x)));
-    }
-    Some(planes)
+        (normal, normal.dot(x))
+    }));
+    true
 }
 
 /// What shadows leave of a polygon, as convex pieces.
-fn left(target: &[DVec3], shadows: &[Shadow]) -> Vec<Loop> {
+fn left<'a>(target: &[DVec3], shadows: impl Iterator<Item = &'a [Plane]>, clip: &mut Clip) -> Vec<Loop> {
     let mut pieces: Vec<Loop> = vec![target.into()];
     let mut next = Vec::new();
     for shadow in shadows {
         for mut piece in pieces.drain(..) {
-            match within(&piece, shadow) {
+            match within(&piece, shadow, clip) {
                 Within::None => next.push(piece),
                 Within::All => {}
                 // Plane by plane: what lies below one is left, what lies above all is hidden.
-                Within::Part(..) => {
+                Within::Part(_) => {
                     for &(normal, offset) in shadow {
                         let mut below = piece.clone();
                         if keep_above(&mut below, -normal, -offset) {
@@ -137,15 +158,22 @@ fn left(target: &[DVec3], shadows: &[Shadow]) -> Vec<Loop> {
 }
 
 /// The form factor of what shadows hide of a polygon whose own is `whole`.
-fn hidden(x: DVec3, normal: DVec3, target: &[DVec3], whole: f64, shadows: &[Shadow]) -> f64 {
+fn hidden(
+    (x, normal): (DVec3, DVec3),
+    target: &[DVec3],
+    whole: f64,
+    (shadows, planes): (&[(u16, Range<usize>)], &[Plane]),
+    clips: &mut [Clip],
+) -> f64 {
+    let Some((clip, clips)) = clips.split_first_mut() else { return 0.0 };
     let mut sum = 0.0;
-    for (k, shadow) in shadows.iter().enumerate() {
-        match within(target, shadow) {
+    for (k, (_, range)) in shadows.iter().enumerate() {
+        match within(target, &planes[range.clone()], clip) {
             Within::None => {}
             Within::All => return whole,
-            Within::Part(part, _) => {
-                let own = lambert(x, normal, &part);
-                sum += own - hidden(x, normal, &part, own, &shadows[..k]);
+            Within::Part(_) => {
+                let own = lambert(x, normal, &clip.part);
+                sum += own - hidden((x, normal), &clip.part, own, (&shadows[..k], planes), clips);
             }
         }
     }
@@ -153,64 +181,78 @@ fn hidden(x: DVec3, normal: DVec3, target: &[DVec3], whole: f64, shadows: &[Shad
 }
 
 /// How much of a polygon lies within a shadow.
-#[expect(clippy::large_enum_variant, reason = "it lives for a few lines, and a box would cost as much as the cuts")]
 enum Within {
     None,
     /// A part, and how it comes about: which planes cut, and which corners lie within.
-    Part(Loop, u64),
+    Part(u64),
     All,
 }
 
-fn within(polygon: &[DVec3], shadow: &Shadow) -> Within {
+/// How much of a polygon lies within a shadow; a part is left in `clip`.
+fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
     // Planes that cut and corners that lie outside, as bits.
     let (mut cuts, mut outside) = (0u64, 0u64);
+    clip.heights.clear();
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
+        let start = clip.heights.len();
         for (i, p) in polygon.iter().enumerate() {
             let h = normal.dot(*p) - offset;
             (low, high) = (low.min(h), high.max(h));
             outside |= u64::from(h < 0.0) << (i % 32);
+            clip.heights.push(h);
         }
         let reach = ROUNDING * high.max(-low);
         if high <= reach {
             return Within::None;
         }
         if low < -reach {
+            if cuts == 0 {
+                keep(polygon, &clip.heights[start..], reach, &mut clip.part);
+            }
             cuts |= 1 << k.min(63);
         }
     }
     if cuts == 0 {
         return Within::All;
     }
-    let mut part: Loop = polygon.into();
+    let rest = cuts & (cuts - 1);
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
-        if cuts >> k.min(63) & 1 == 1 && !keep_above(&mut part, normal, offset) {
+        if rest >> k.min(63) & 1 == 1 && !clip.keep_above(normal, offset) {
             return Within::None;
         }
     }
-    Within::Part(part, cuts ^ outside << 32)
+    Within::Part(cuts ^ outside << 32)
 }
 
-/// Cuts off what lies below a plane; whether anything is left.
-pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
-    let n = polygon.len();
-    let mut heights: SmallVec<[f64; 16]> = SmallVec::from_elem(0.0, n);
-    let (mut low, mut high) = (0.0f64, 0.0f64);
-    for (height, p) in heights.iter_mut().zip(&*polygon) {
-        let h = normal.dot(*p) - offset;
-        (low, high) = (low.min(h), high.max(h));
-        *height = h;
+impl Clip {
+    /// Cuts off what lies below a plane; whether anything is left.
+    fn keep_above(&mut self, normal: DVec3, offset: f64) -> bool {
+        self.heights.clear();
+        self.heights.extend(self.part.iter().map(|p| normal.dot(*p) - offset));
+        let Some(reach) = reach(&self.heights) else { return false };
+        if self.heights.iter().all(|h| *h >= -reach) {
+            return true;
+        }
+        keep(&self.part, &self.heights, reach, &mut self.next);
+        std::mem::swap(&mut self.part, &mut self.next);
+        self.part.len() >= 3
     }
+}
+
+/// Heights that count as none; `None` if none is above it.
+fn reach(heights: &[f64]) -> Option<f64> {
+    let (low, high) = heights.iter().fold((0.0f64, 0.0f64), |(low, high), h| (low.min(*h), high.max(*h)));
     let reach = ROUNDING * high.max(-low);
-    if high <= reach {
-        return false;
-    }
-    if low >= -reach {
-        return true;
-    }
-    let mut kept = Loop::new();
+    (high > reach).then_some(reach)
+}
+
+/// What of a polygon is not below a plane, by the heights of its corners; `reach` counts as none.
+fn keep(polygon: &[DVec3], heights: &[f64], reach: f64, kept: &mut Vec<DVec3>) {
+    kept.clear();
+    let n = polygon.len();
     let (mut p, mut h) = (polygon[n - 1], heights[n - 1]);
-    for (&next, &height) in polygon.iter().zip(&heights) {
+    for (&next, &height) in polygon.iter().zip(heights) {
         if (h > reach && height < -reach) || (h < -reach && height > reach) {
             kept.push(p + h / (h - height) * (next - p));
         }
@@ -219,6 +261,17 @@ pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
         }
         (p, h) = (next, height);
     }
-    *polygon = kept;
+}
+
+/// Cuts off what lies below a plane; whether anything is left.
+pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
+    let heights: SmallVec<[f64; 16]> = polygon.iter().map(|p| normal.dot(*p) - offset).collect();
+    let Some(reach) = reach(&heights) else { return false };
+    if heights.iter().all(|h| *h >= -reach) {
+        return true;
+    }
+    let mut kept = Vec::with_capacity(polygon.len() + 2);
+    keep(polygon, &heights, reach, &mut kept);
+    *polygon = Loop::from_slice(&kept);
     polygon.len() >= 3
 }
