@@ -116,7 +116,7 @@ impl Contender {
         let cells = |points| RESOLUTIONS.map(|resolution| Setting::Cells { resolution, points });
         match self {
             Contender::Rays => [16, 64, 256, 1024, 4096].map(Setting::Rays).to_vec(),
-            Contender::Method(FormFactorMethod::Adaptive) => [1e-2, 1e-3, 1e-4, 1e-5].map(Setting::Accuracy).to_vec(),
+            Contender::Method(FormFactorMethod::Adaptive) => [1e-3, 1e-4, 1e-5].map(Setting::Accuracy).to_vec(),
             Contender::Method(FormFactorMethod::Row(RowMethod::Hemisphere)) => {
                 [256, 1024, 4096, 16384].map(Setting::Rays).to_vec()
             }

@@ -55,7 +55,7 @@ mod tests {
     impl<F: Fn(DVec3) -> f64> Shaded for Plain<F> {
         fn sight(&mut self, _: u16, x: DVec3, _: &[u16]) -> Sight {
             let seen = (self.0)(x);
-            Sight::Partly { factors: [seen, 2.0 - seen], hiding: u64::from(seen > 0.0) }
+            Sight::Partly { factors: [seen, 2.0 - seen], bodies: 1, how: u64::from(seen > 0.0) }
         }
 
         fn all(&mut self, _: DVec3) -> f64 {
@@ -70,7 +70,7 @@ mod tests {
             false
         }
 
-        fn possible(&mut self, _: &[DVec3], _: &[u16]) -> f64 {
+        fn possible(&mut self, _: &[DVec3], _: &[u16], _: u64) -> f64 {
             0.0
         }
 

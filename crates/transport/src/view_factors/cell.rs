@@ -63,8 +63,9 @@ pub trait Shaded {
     /// Whether nothing is hidden from any of a cell, which it is not from its corners.
     fn is_clear(&mut self, corners: &[DVec3], list: &[u16]) -> bool;
 
-    /// The most that the panels listed might hide from the centre of a cell, seen from any of its places.
-    fn possible(&mut self, corners: &[DVec3], list: &[u16]) -> f64;
+    /// The most that the panels listed might hide from the centre of a cell, seen from any of its places; but for those of
+    /// some bodies, as bits.
+    fn possible(&mut self, corners: &[DVec3], list: &[u16], without: u64) -> f64;
 
     /// Visible and hidden together, over a cell.
     fn whole(&mut self, cell: &Frame) -> Exchange;
@@ -121,11 +122,12 @@ impl Cell {
     }
 }
 
-/// What a place sees: visible and hidden, and the bodies that hide, as bits.
+/// What a place sees: visible and hidden, the bodies that hide, as bits, and how they do, as a hash.
 #[derive(Clone, Copy)]
 struct Place {
     factors: [f64; 2],
-    hiding: u64,
+    bodies: u64,
+    how: u64,
 }
 
 impl Place {
@@ -168,8 +170,13 @@ impl Places {
 
     /// Whether some places see a shadow and others not: it begins or ends between them.
     fn is_bent(&self) -> bool {
-        self.corners.iter().any(|c| c.hiding != self.centre.hiding)
+        self.corners.iter().any(|c| c.how != self.centre.how)
     }
+}
+
+/// The bit of a body; of more than 64 some share one.
+pub fn bit(body: u16) -> u64 {
+    1 << (body % 64)
 }
 
 /// The share of both that is visible.
@@ -275,9 +282,9 @@ impl<'a, S: Shaded> Domain<'a, S> {
 
     fn place(&mut self, sight: Sight, place: DVec3) -> Place {
         match sight {
-            Sight::Whole => Place { factors: [self.shaded.all(place), 0.0], hiding: 0 },
-            Sight::Nothing(_) => Place { factors: [0.0, self.shaded.all(place)], hiding: u64::MAX },
-            Sight::Partly { factors, hiding } => Place { factors, hiding },
+            Sight::Whole => Place { factors: [self.shaded.all(place), 0.0], bodies: 0, how: 0 },
+            Sight::Nothing(by) => Place { factors: [0.0, self.shaded.all(place)], bodies: bit(by), how: u64::MAX },
+            Sight::Partly { factors, bodies, how } => Place { factors, bodies, how },
         }
     }
 
@@ -315,7 +322,10 @@ impl<'a, S: Shaded> Domain<'a, S> {
         if MORE * hidden >= seen + hidden {
             return gap;
         }
-        let possible = self.shaded.possible(&shape.corners(), cell.before.as_deref().unwrap_or(&[]));
+        // Where all places see shadows fall alike, those bodies hide nothing else.
+        let known = if places.is_bent() { 0 } else { places.centre.bodies };
+        let list = cell.before.as_deref().unwrap_or(&[]);
+        let possible = self.shaded.possible(&shape.corners(), list, known);
         gap + DOUBT * (shape.area() * (possible - MORE * hidden)).clamp(0.0, cell.values[0])
     }
 }

@@ -8,7 +8,7 @@
 
 use super::adaptive::integrate;
 use super::body::{Body, Occluder, Setting};
-use super::cell::{List, Shaded};
+use super::cell::{List, Shaded, bit};
 use super::clear::{Exchange, clear_frame, closed_form};
 use super::frame::Frame;
 use super::panel::Panel;
@@ -138,11 +138,11 @@ impl Shaded for View<'_> {
         list.iter().all(|k| shaft.stands(self.panels[*k as usize], Look::Close) == Stands::Aside)
     }
 
-    fn possible(&mut self, corners: &[DVec3], list: &[u16]) -> f64 {
+    fn possible(&mut self, corners: &[DVec3], list: &[u16], without: u64) -> f64 {
         let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
         let mut shaft = self.shaft(corners);
         let mut sum = 0.0;
-        for &k in list {
+        for &k in list.iter().filter(|k| bit(self.body_of[**k as usize]) & without == 0) {
             let panel = self.panels[k as usize];
             let mut part = shaft.part_of(panel);
             if panel.height(centre) < 0.0 {

@@ -6,6 +6,7 @@
 //! taken. Λ is Lambert's contour integral (1760).
 
 use super::body::{Line, Occluder};
+use super::cell::bit;
 pub(crate) use crate::polygon::point_to_polygon_above as lambert;
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -63,8 +64,10 @@ pub enum Sight {
     Partly {
         /// F to what is visible and to what is hidden.
         factors: [f64; 2],
+        /// The bodies that hide something, as bits.
+        bodies: u64,
         /// What of which bodies hides which corners, as a hash: where places differ, the factors bend between them.
-        hiding: u64,
+        how: u64,
     },
 }
 
@@ -88,23 +91,23 @@ impl Shadows {
             }
         }
         let Shadows { planes, of, clips: [clip, clips @ ..] } = self;
-        let (mut is_whole, mut hidden_all, mut hiding) = (true, 0.0, 0u64);
+        let (mut hidden_all, mut bodies, mut hash) = (0.0, 0u64, 0u64);
         let are_many = of.len() > FEW;
         for (k, (body, range)) in of.iter().enumerate() {
             match within(target, &planes[range.clone()], clip) {
                 Within::None => {}
                 Within::All => return Sight::Nothing(*body),
                 Within::Part(how) => {
-                    is_whole = false;
+                    bodies |= bit(*body);
                     if !are_many {
                         let own = lambert(x, normal, &clip.part);
                         hidden_all += own - hidden((x, normal), &clip.part, own, (&of[..k], planes), clips);
                     }
-                    hiding = (hiding ^ how ^ u64::from(*body) << 48).wrapping_mul(MIX).rotate_left(29);
+                    hash = (hash ^ how ^ u64::from(*body) << 48).wrapping_mul(MIX).rotate_left(29);
                 }
             }
         }
-        if is_whole {
+        if bodies == 0 {
             return Sight::Whole;
         }
         let whole = lambert(x, normal, target);
@@ -112,7 +115,7 @@ impl Shadows {
             let left = left(target, of.iter().map(|(_, range)| &planes[range.clone()]), clip);
             hidden_all = whole - left.iter().map(|piece| lambert(x, normal, piece)).sum::<f64>();
         }
-        Sight::Partly { factors: [(whole - hidden_all).max(0.0), hidden_all], hiding }
+        Sight::Partly { factors: [(whole - hidden_all).max(0.0), hidden_all], bodies, how: hash }
     }
 }
 
@@ -196,10 +199,9 @@ fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
         let start = clip.heights.len();
-        for (i, p) in polygon.iter().enumerate() {
+        for p in polygon {
             let h = normal.dot(*p) - offset;
             (low, high) = (low.min(h), high.max(h));
-            outside |= u64::from(h < 0.0) << (i % 32);
             clip.heights.push(h);
         }
         let reach = ROUNDING * high.max(-low);
@@ -211,6 +213,9 @@ fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
                 keep(polygon, &clip.heights[start..], reach, &mut clip.part);
             }
             cuts |= 1 << k.min(63);
+            for (i, h) in clip.heights[start..].iter().enumerate() {
+                outside |= u64::from(*h < -reach) << (i % 32);
+            }
         }
     }
     if cuts == 0 {
