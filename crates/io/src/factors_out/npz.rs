@@ -1,7 +1,8 @@
 //! Form factors for NumPy: a ZIP of arrays in its format `.npy` 1.0 (magic, a header in Python, numbers in little endian).
 //!
 //! Dense: `F` (N × N). Sparse: `indices`, `indptr`, `format`, `shape` and `data`, as `scipy.sparse.save_npz` has them for CSR.
-//! Beside them `area`, and where they are known `error` (bounds of the errors, shaped as `F` or `data`), `names` and `emittance`. All load without pickle.
+//! Beside them `area`, and where they are known `error` (bounds of the errors, shaped as `F` or `data`), `names` and
+//! `emittance`. All load without pickle.
 
 use super::{FactorRows, FactorTable};
 use std::io::{Result, Seek, Write};

@@ -16,7 +16,7 @@ use std::time::Instant;
 /// factors are independent, so that light is better by far.
 const ACCURACIES: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 
-/// How much longer the next is expected to take: 1.4, 3.6 and 7 times in the Cornell box.
+/// How much longer the next is expected to take: 1.3, 2.7 and 5.5 times in the Cornell box.
 const LONGER: f64 = 4.0;
 
 /// Relative residual of B.

@@ -2,9 +2,9 @@
 //! formulation for radiative angle factors"; catalogue 17), n points on every edge of one outline times n + 1 on every
 //! edge of the other, so that no two coincide on a shared edge.
 //!
-//! Twelve digits for facets as far apart as they are wide; two where they share an edge, on which the logarithm
-//! is singular and the error falls only like 1/n. The error is predicted from the rule of half as many points. Sees nothing between: where something may stand there, the error says so. [`super::exact`]
-//! needs no points.
+//! Twelve digits for facets as far apart as they are wide; two where they share an edge, on which the logarithm is
+//! singular and the error falls only like 1/n. The error is predicted from the rule of half as many points. Sees
+//! nothing between: where something may stand there, the error says so. [`super::exact`] needs no points.
 
 use super::exact::facing;
 use super::gauss::{MOST, gauss};

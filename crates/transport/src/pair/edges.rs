@@ -2,11 +2,11 @@
 //!
 //! Parallel edges have an elementary integral. Skew edges are described by their distances a and b from the feet of the
 //! common perpendicular, of length d, and their angle θ: r² = a² + b² − 2ab cos θ + d². The divergence theorem, with
-//! x·∇ ln r² = 2 − 2d²/r², leaves integrals over one edge each and d² ∫∫ 1/r², which is elementary for edges in one plane
-//! (d = 0) and otherwise, with a sin θ = d sinh x and b sin θ = d sinh y, a sum of dilogarithms of e^{±x±y±iθ}, as
-//! Schröder and Hanrahan 1993 ("On the form factor between two polygons") found by other means. Edges apart are
-//! integrated by Gauss, which is faster and loses fewer digits. Loses digits only for edges that are almost, not quite, parallel and
-//! much nearer than they are long.
+//! x·∇ ln r² = 2 − 2d²/r², leaves integrals over one edge each and d² ∫∫ 1/r², which is elementary for edges in one
+//! plane (d = 0) and otherwise, with a sin θ = d sinh x and b sin θ = d sinh y, a sum of dilogarithms of e^{±x±y±iθ},
+//! as Schröder and Hanrahan 1993 ("On the form factor between two polygons") found by other means. Edges apart are
+//! integrated by Gauss, which is faster and loses fewer digits. Loses digits only for edges that are almost, not quite,
+//! parallel and much nearer than they are long.
 
 use super::gauss::gauss;
 use glam::DVec3;

@@ -43,8 +43,8 @@ use visible::Shadows;
 /// How exact the factors are to be, and what they may take.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFactorOptions {
-    /// Bound of the error of each F_ij between surfaces that see each other partly; of surfaces of many facets a bound
-    /// of what those are asked for.
+    /// Bound asked for the error of F_ij between surfaces that see each other partly. A surface of many facets may miss it
+    /// by a little, as no pair of facets is asked for less than a tenth of it.
     pub accuracy: f64,
     /// The same for those that see each other whole.
     pub clear_accuracy: f64,

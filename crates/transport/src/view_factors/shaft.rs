@@ -2,7 +2,8 @@
 //!
 //! What lies between two sets is the convex hull of both (Haines and Wallace 1991, "Shaft culling"). It meets the plane
 //! of a panel in the hull of the points where segments between corners cross it. If that misses the panel, nothing is
-//! blocked; if it lies within the panel and the sets lie on either side, everything is. Both are proofs.
+//! blocked; if it lies within the panel and the sets lie on either side, everything is. Both are proofs, to within `touch`:
+//! the distance below which points count as lying on a plane.
 
 use super::panel::Panel;
 use super::part::CORNERS;
