@@ -30,7 +30,8 @@ use crate::{Progress, Stopped};
 use clear::clear;
 use cluster::Clusters;
 use mixed::mixed;
-use panel::{Panel, Planes, panels};
+use panel::Panel;
+pub(crate) use panel::{Planes, convex_pieces, panels, united};
 use part::Part;
 use radiosity_scene::{Enclosure, Facet};
 use rayon::prelude::*;
@@ -120,7 +121,7 @@ impl Choices {
 
 /// Distance below which points lie on a plane, relative to the diagonal of the scene: what single precision leaves of
 /// coordinates. Sheets closer than this block each other no more.
-const TOUCH: f64 = 5e-7;
+pub(crate) const TOUCH: f64 = 5e-7;
 
 /// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
 const WHOLE: f64 = 0.05;

@@ -185,7 +185,7 @@ fn straighten(contour: &mut Vec<[f64; 2]>, touch: f64) {
 }
 
 /// Convex polygons that cover what the facets of one plane cover, counter-clockwise about `normal`.
-fn united(facets: &[&Facet], normal: DVec3, touch: f64) -> Vec<Vec<DVec3>> {
+pub fn united(facets: &[&Facet], normal: DVec3, touch: f64) -> Vec<Vec<DVec3>> {
     let origin = facets[0].corners()[0];
     let (x, y) = normal.any_orthonormal_pair();
     let flat = |p: DVec3| [x.dot(p - origin), y.dot(p - origin)];
@@ -199,12 +199,18 @@ fn united(facets: &[&Facet], normal: DVec3, touch: f64) -> Vec<Vec<DVec3>> {
             contour
         })
         .collect();
-    let mut union = contours.simplify_shape_as::<i64>(FillRule::NonZero);
-    for contour in union.iter_mut().flatten() {
+    let union = contours.simplify_shape_as::<i64>(FillRule::NonZero);
+    let back = |p: [f64; 2]| origin + p[0] * x + p[1] * y;
+    convex_pieces(union, touch).into_iter().map(|piece| piece.into_iter().map(back).collect()).collect()
+}
+
+/// Shapes, outlines and holes, cut into convex polygons, counter-clockwise. Corners within `touch` of the line between their
+/// neighbours are dropped.
+pub fn convex_pieces(mut shapes: Vec<Vec<Vec<[f64; 2]>>>, touch: f64) -> Vec<Vec<[f64; 2]>> {
+    for contour in shapes.iter_mut().flatten() {
         straighten(contour, touch);
     }
-    let pieces = union.triangulate_as::<i64>().into_delaunay().to_convex_polygons();
-    let back = |p: [f64; 2]| origin + p[0] * x + p[1] * y;
+    let pieces = shapes.triangulate_as::<i64>().into_delaunay().to_convex_polygons();
     pieces
         .into_iter()
         .filter_map(|mut piece| {
@@ -213,7 +219,7 @@ fn united(facets: &[&Facet], normal: DVec3, touch: f64) -> Vec<Vec<DVec3>> {
             if twice < 0.0 {
                 piece.reverse();
             }
-            (piece.len() >= 3 && twice != 0.0).then(|| piece.into_iter().map(back).collect())
+            (piece.len() >= 3 && twice != 0.0).then_some(piece)
         })
         .collect()
 }
