@@ -2,7 +2,7 @@
 //!
 //! A region of p elements and q boundary patches costs (p + q)²; the union of A and B, which share s patches, costs
 //! (p_A + p_B + q_A + q_B − 2s)². First all cells are joined between which a plane only went through a room; then, the pair
-//! that gains most before the others, all whose union costs less; then doorways, which have no more elements than patches.
+//! that gains most before the others, all whose union costs less; then doorways, which are more open than they have walls.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -12,18 +12,30 @@ pub struct Border {
     pub cells: [u32; 2],
     /// Patches that it will have.
     pub patches: f64,
+    /// Area, m².
+    pub area: f64,
     /// It is no wall's.
     pub is_soft: bool,
+}
+
+/// What a cell holds.
+#[derive(Clone, Copy, Default)]
+pub struct Content {
+    /// p: facets, by the part of their area that it has.
+    pub elements: f64,
+    /// Area of these, m².
+    pub area: f64,
 }
 
 struct Merger {
     parent: Vec<u32>,
     /// How often each has grown.
     age: Vec<u32>,
-    p: Vec<f64>,
-    /// Patches shared with each neighbour.
-    shared: Vec<BTreeMap<u32, f64>>,
-    q: Vec<f64>,
+    own: Vec<Content>,
+    /// Patches shared with each neighbour, and their area.
+    shared: Vec<BTreeMap<u32, [f64; 2]>>,
+    /// q, and the area of these patches.
+    outer: Vec<[f64; 2]>,
     heap: BinaryHeap<Reverse<(i64, u32, u32, u32, u32)>>,
 }
 
@@ -37,8 +49,8 @@ impl Merger {
 
     /// What joining two neighbours adds to the cost.
     fn rise(&self, a: u32, b: u32) -> f64 {
-        let of = |i: u32| self.p[i as usize] + self.q[i as usize];
-        let shared = self.shared[a as usize].get(&b).copied().unwrap_or(0.0);
+        let of = |i: u32| self.own[i as usize].elements + self.outer[i as usize][0];
+        let shared = self.shared[a as usize].get(&b).map_or(0.0, |shared| shared[0]);
         (of(a) + of(b) - 2.0 * shared).powi(2) - of(a).powi(2) - of(b).powi(2)
     }
 
@@ -49,15 +61,17 @@ impl Merger {
         let (i, j) = (a as usize, b as usize);
         self.parent[j] = a;
         self.age[i] += 1;
-        self.p[i] += self.p[j];
-        let common = self.shared[i].remove(&b).unwrap_or(0.0);
-        self.q[i] += self.q[j] - 2.0 * common;
+        self.own[i].elements += self.own[j].elements;
+        self.own[i].area += self.own[j].area;
+        let common = self.shared[i].remove(&b).unwrap_or_default();
+        let (grown, taken) = (self.outer[i], self.outer[j]);
+        self.outer[i] = [0, 1].map(|k| grown[k] + taken[k] - 2.0 * common[k]);
         for (other, patches) in std::mem::take(&mut self.shared[j]) {
             if other != a {
-                *self.shared[i].entry(other).or_default() += patches;
+                add(self.shared[i].entry(other).or_default(), patches);
                 let back = &mut self.shared[other as usize];
                 back.remove(&b);
-                *back.entry(a).or_default() += patches;
+                add(back.entry(a).or_default(), patches);
             }
         }
         a
@@ -94,7 +108,7 @@ impl Merger {
     fn join_doorways(&mut self) {
         for cell in 0..self.parent.len() as u32 {
             let mut a = self.root(cell);
-            while self.p[a as usize] <= self.q[a as usize] {
+            while self.own[a as usize].area <= self.outer[a as usize][1] {
                 let least = |x: &u32, y: &u32| self.rise(a, *x).total_cmp(&self.rise(a, *y));
                 let Some(b) = self.shared[a as usize].keys().copied().min_by(least) else { break };
                 a = self.join(a, b);
@@ -103,21 +117,25 @@ impl Merger {
     }
 }
 
-/// A region for each cell, by the id of one of its cells. `elements` is p by cell.
-pub fn merge(elements: &[f64], borders: &[Border]) -> Vec<u32> {
-    let n = elements.len();
+fn add(sum: &mut [f64; 2], more: [f64; 2]) {
+    sum.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+}
+
+/// A region for each cell, by the id of one of its cells.
+pub fn merge(cells: Vec<Content>, borders: &[Border]) -> Vec<u32> {
+    let n = cells.len();
     let mut merger = Merger {
         parent: (0..n as u32).collect(),
         age: vec![0; n],
-        p: elements.to_vec(),
+        own: cells,
         shared: vec![BTreeMap::new(); n],
-        q: vec![0.0; n],
+        outer: vec![[0.0; 2]; n],
         heap: BinaryHeap::new(),
     };
-    for Border { cells: [a, b], patches, .. } in borders {
+    for Border { cells: [a, b], patches, area, .. } in borders {
         for (one, other) in [(*a, *b), (*b, *a)] {
-            *merger.shared[one as usize].entry(other).or_default() += patches;
-            merger.q[one as usize] += patches;
+            add(merger.shared[one as usize].entry(other).or_default(), [*patches, *area]);
+            add(&mut merger.outer[one as usize], [*patches, *area]);
         }
     }
     for border in borders.iter().filter(|border| border.is_soft) {

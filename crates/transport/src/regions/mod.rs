@@ -24,7 +24,7 @@ mod section;
 
 use crate::view_factors::TOUCH;
 use finish::finish;
-use merge::merge;
+use merge::{Content, merge};
 use partition::partition;
 use radiosity_scene::{Enclosure, Facet};
 use section::Space;
@@ -128,13 +128,16 @@ pub fn regions(enclosure: &Enclosure, options: &RegionOptions) -> Regions {
     let size = options.patch.filter(|size| *size > 0.0).unwrap_or(mean);
     let space = Space::new(enclosure, bounds, TOUCH * bounds[0].distance(bounds[1]));
     let partition = partition(enclosure, &space, size, options.most_open);
-    let mut elements = vec![0.0; partition.ids as usize];
+    let mut cells = vec![Content::default(); partition.ids as usize];
     for leaf in &partition.leaves {
-        // By area, so that the parts of a facet count as one when they come together.
-        let share =
-            |piece: &partition::Piece| polygon::area(&piece.corners) / enclosure.facets[piece.facet as usize].area();
-        elements[leaf.id as usize] = leaf.pieces.iter().map(share).sum();
+        let cell = &mut cells[leaf.id as usize];
+        for piece in &leaf.pieces {
+            // By area, so that the parts of a facet count as one when they come together.
+            let area = polygon::area(&piece.corners);
+            cell.elements += area / enclosure.facets[piece.facet as usize].area();
+            cell.area += area;
+        }
     }
-    let region_of_cell = merge(&elements, &partition.borders(size));
+    let region_of_cell = merge(cells, &partition.borders(size));
     finish(enclosure, partition, &region_of_cell, size, space.touch)
 }

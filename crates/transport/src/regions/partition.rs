@@ -79,6 +79,7 @@ impl Partition<'_> {
         let border = |portal: &Portal| Border {
             cells: portal.cells,
             patches: count(&portal.corners, portal.normal, size),
+            area: area(&portal.corners),
             is_soft: portal.is_soft,
         };
         self.portals.iter().map(border).collect()
