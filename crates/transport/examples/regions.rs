@@ -1,5 +1,5 @@
-//! Regions of office buildings, found without help: how many, what they cost beside the partition by hand, and in what time;
-//! and a plan of the lowest floor as a picture.
+//! Regions of office buildings, found without help: how many, what they cost beside the partition by hand, and in what
+//! time; and a plan of the lowest floor as a picture.
 //!
 //! `cargo run --release -p radiosity-transport --example regions -- out/regions.svg`
 
@@ -40,8 +40,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The plan of what reaches below 2 m, seen from above: facets that look up filled with their region's colour, the others
-/// and the boundary patches (black) as lines.
+/// The plan of what reaches below 2 m, seen from above: facets that look up filled with their region's colour, the
+/// others and the boundary patches (black) as lines.
 fn plan(found: &Regions) -> String {
     let mut svg = String::from("<svg xmlns='http://www.w3.org/2000/svg' viewBox='-0.3 -10.7 26.5 11' width='1325'>\n");
     let low = |corners: &[DVec3]| corners.iter().map(|c| c.z).fold(f64::INFINITY, f64::min) < 2.0;

@@ -1,5 +1,5 @@
-//! Automatic regions (catalogue 93): office buildings against the partition by hand, the laws that localization needs, and
-//! input that makes no rooms.
+//! Automatic regions (catalogue 93): office buildings against the partition by hand, the laws that localization needs,
+//! and input that makes no rooms.
 
 #[path = "rooms/building.rs"]
 mod building;
@@ -29,8 +29,8 @@ fn turned(enclosure: &Enclosure) -> Enclosure {
     turned
 }
 
-/// Two rooms of 3 × 3 × 3 m with a sheet between them that leaves a door open; floor, ceiling and long walls go through, in
-/// strips that the sheet does not follow.
+/// Two rooms of 3 × 3 × 3 m with a sheet between them that leaves a door open; floor, ceiling and long walls go
+/// through, in strips that the sheet does not follow.
 fn two_rooms() -> Enclosure {
     let mut two = box_of(DVec3::new(6.0, 3.0, 3.0), 5);
     let [y, z] = [DVec3::Y, DVec3::Z];
@@ -43,7 +43,8 @@ fn two_rooms() -> Enclosure {
     two
 }
 
-/// Catalogue 93: without help Σ(p + q)² is within 20 % of the partition by hand: room by room, with boundaries in the doors.
+/// Catalogue 93: without help Σ(p + q)² is within 20 % of the partition by hand: room by room, with boundaries in the
+/// doors.
 #[test]
 fn catalogue_93_twenty_rooms_as_by_hand() {
     for thickness in WALLS {
@@ -112,8 +113,8 @@ fn catalogue_93_each_point_is_in_one_region() {
     assert_eq!((found.len(), found.pieces.len()), (2, two.facets.len() + 4 * 5), "the middle strips are cut");
 }
 
-/// The regions that a line of sight goes through by the patches it crosses, from the region `from`; `None` if the patches
-/// make no way.
+/// The regions that a line of sight goes through by the patches it crosses, from the region `from`; `None` if the
+/// patches make no way.
 fn way(found: &Regions, from: u32, [a, b]: [DVec3; 2]) -> Option<u32> {
     let mut crossed: Vec<(f64, usize)> = Vec::new();
     for (k, patch) in found.patches.iter().enumerate() {
@@ -135,8 +136,8 @@ fn way(found: &Regions, from: u32, [a, b]: [DVec3; 2]) -> Option<u32> {
     })
 }
 
-/// Catalogue 93: points that see each other do so through patches that lead from the region of one to that of the other, in
-/// every enclosure here. A line may miss within 1e-6 m of a patch's rim: one in a million.
+/// Catalogue 93: points that see each other do so through patches that lead from the region of one to that of the
+/// other, in every enclosure here. A line may miss within 1e-6 m of a patch's rim: one in a million.
 #[test]
 fn catalogue_93_sight_lines_cross_boundary_patches() {
     let building = |thickness| Building::new(Plan::of_rooms(20, thickness, 0.7)).enclosure;

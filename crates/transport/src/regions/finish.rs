@@ -70,6 +70,10 @@ fn pieces(facet: &Facet, mut fragments: Vec<(u32, &[DVec3])>, touch: f64) -> Vec
     pieces
 }
 
+/// What the parts of an opening have in common: the regions, the cut, and whether its plane looks from the first to the
+/// second.
+type Key = ([u32; 2], u32, bool);
+
 /// Meshes the openings between regions; parts of an opening are put together first.
 fn add_patches(
     found: &mut Regions,
@@ -78,7 +82,7 @@ fn add_patches(
     size: f64,
     touch: f64,
 ) {
-    let mut openings: BTreeMap<([u32; 2], u32, bool), (DVec3, Vec<Facet>)> = BTreeMap::new();
+    let mut openings: BTreeMap<Key, (DVec3, Vec<Facet>)> = BTreeMap::new();
     for portal in portals {
         let [Some(a), Some(b)] = portal.cells.map(&number_of) else { continue };
         let Ok(facet) = Facet::new(portal.corners) else { continue };

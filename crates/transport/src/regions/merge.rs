@@ -1,8 +1,9 @@
 //! Cells become regions: neighbours whose union costs less are joined.
 //!
 //! A region of p elements and q boundary patches costs (p + q)²; the union of A and B, which share s patches, costs
-//! (p_A + p_B + q_A + q_B − 2s)². First all cells are joined between which a plane only went through a room; then, the pair
-//! that gains most before the others, all whose union costs less; then doorways, which are more open than they have walls.
+//! (p_A + p_B + q_A + q_B − 2s)². First all cells are joined between which a plane only went through a room; then, the
+//! pair that gains most before the others, all whose union costs less; then doorways, which are more open than they
+//! have walls.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -27,6 +28,9 @@ pub struct Content {
     pub area: f64,
 }
 
+/// Two neighbours: by how much their union raises the cost, in 1/1024, their ids, and the ages at which that was so.
+type Offer = (i64, [u32; 2], [u32; 2]);
+
 struct Merger {
     parent: Vec<u32>,
     /// How often each has grown.
@@ -36,7 +40,8 @@ struct Merger {
     shared: Vec<BTreeMap<u32, [f64; 2]>>,
     /// q, and the area of these patches.
     outer: Vec<[f64; 2]>,
-    heap: BinaryHeap<Reverse<(i64, u32, u32, u32, u32)>>,
+    /// Pairs to be joined, the largest gain first.
+    offers: BinaryHeap<Reverse<Offer>>,
 }
 
 impl Merger {
@@ -83,9 +88,9 @@ impl Merger {
         for b in neighbours {
             let rise = self.rise(a, b);
             if rise < 0.0 {
-                let key = ((rise * 1024.0) as i64, a.min(b), a.max(b));
-                let [first, second] = [key.1, key.2].map(|i| self.age[i as usize]);
-                self.heap.push(Reverse((key.0, key.1, key.2, first, second)));
+                let pair = [a.min(b), a.max(b)];
+                let ages = pair.map(|i| self.age[i as usize]);
+                self.offers.push(Reverse(((rise * 1024.0) as i64, pair, ages)));
             }
         }
     }
@@ -96,7 +101,7 @@ impl Merger {
                 self.offer(a);
             }
         }
-        while let Some(Reverse((_, a, b, first, second))) = self.heap.pop() {
+        while let Some(Reverse((_, [a, b], [first, second]))) = self.offers.pop() {
             let is_current = |i: u32, age: u32| self.parent[i as usize] == i && self.age[i as usize] == age;
             if is_current(a, first) && is_current(b, second) {
                 let joined = self.join(a, b);
@@ -130,7 +135,7 @@ pub fn merge(cells: Vec<Content>, borders: &[Border]) -> Vec<u32> {
         own: cells,
         shared: vec![BTreeMap::new(); n],
         outer: vec![[0.0; 2]; n],
-        heap: BinaryHeap::new(),
+        offers: BinaryHeap::new(),
     };
     for Border { cells: [a, b], patches, area, .. } in borders {
         for (one, other) in [(*a, *b), (*b, *a)] {

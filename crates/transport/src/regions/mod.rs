@@ -1,20 +1,20 @@
 //! Regions: an enclosure cut into rooms, and the boundary patches through which they see each other.
 //!
-//! Localization (Xu 1990) computes form factors room by room. A *region* with p elements and q *boundary patches*, transparent
-//! polygons that part it from its neighbours, takes (p + q)² of them, so n rooms cost Σ(p + q)² where the whole costs (Σp)².
-//! Here regions and patches are found without help: space is cut by planes of walls (`partition`, as Airey 1990 and Teller
-//! 1992 cut it), a plane's openings are what its walls leave free (`section`), and cells are joined where their union
-//! costs less or where a plane only went through a room (`merge`).
+//! Localization (Xu 1990) computes form factors room by room. A *region* with p elements and q *boundary patches*,
+//! transparent polygons that part it from its neighbours, takes (p + q)² of them, so n rooms cost Σ(p + q)² where the
+//! whole costs (Σp)². Here regions and patches are found without help: space is cut by planes of walls (`partition`, as
+//! Airey 1990 and Teller 1992 cut it), a plane's openings are what its walls leave free (`section`), and cells are
+//! joined where their union costs less or where a plane only went through a room (`merge`).
 //!
-//! **What holds.** Each point of a facet is in exactly one region: facets that lie in a wall belong where their fronts look, and
-//! those that a boundary goes through are cut by it. Whatever two points of different regions see of each other, they see
-//! through boundary patches, which lead from region to region. Patches are planar, do not overlap, and lie where no facet
-//! does.
+//! **What holds.** Each point of a facet is in exactly one region: facets that lie in a wall belong where their fronts
+//! look, and those that a boundary goes through are cut by it. Whatever two points of different regions see of each
+//! other, they see through boundary patches, which lead from region to region. Patches are planar, do not overlap, and
+//! lie where no facet does.
 //!
 //! **Where it fails.** Only planes of facets cut: a room behind a curved wall stays one with its neighbour, and a hall
-//! without walls is one region. Planes are known within 5e-7 of the scene's diagonal, and openings narrower than that are
-//! none. What is seen of nobody's space (from which no front of a facet is seen in 64 directions) crosses no patch: a
-//! long black pipe between two rooms, active on the outside only, would be overlooked.
+//! without walls is one region. Planes are known within 5e-7 of the scene's diagonal, and openings narrower than that
+//! are none. What is seen of nobody's space (from which no front of a facet is seen in 64 directions) crosses no patch:
+//! a long black pipe between two rooms, active on the outside only, would be overlooked.
 
 mod finish;
 mod merge;
@@ -32,8 +32,8 @@ use section::Space;
 /// How regions are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionOptions {
-    /// Width of boundary patches, m; `None`: the root of the mean area of the facets. Finer patches tell more of where light
-    /// goes through, and cost more.
+    /// Width of boundary patches, m; `None`: the root of the mean area of the facets. Finer patches tell more of where
+    /// light goes through, and cost more.
     pub patch: Option<f64>,
     /// Largest share of a plane, within the space that somebody sees, that may be open for it to be a wall. At ½ doors,
     /// windows and arches part rooms; with more, tables and low shelves would, with less, wide arches would not.
@@ -97,8 +97,9 @@ impl Regions {
         (0..self.sides.len() as u32).filter(move |k| self.sides[*k as usize].contains(&region))
     }
 
-    /// A region alone: its pieces, then its boundary patches in the order of [`Self::patches_of`], active towards the inside, with
-    /// all that stands in the way. Closed where `whole` is; surfaces keep their names, patches have one each.
+    /// A region alone: its pieces, then its boundary patches in the order of [`Self::patches_of`], active towards the
+    /// inside, with all that stands in the way. Closed where `whole` is; surfaces keep their names, patches have one
+    /// each.
     pub fn local(&self, whole: &Enclosure, region: u32) -> Enclosure {
         let mut local = Enclosure { title: whole.title.clone(), is_closed: whole.is_closed, ..Enclosure::default() };
         local.surfaces.clone_from(&whole.surfaces);

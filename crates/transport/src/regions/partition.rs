@@ -1,8 +1,8 @@
 //! Space is cut by planes of walls, a cell at a time, while that lowers what the cells cost.
 //!
-//! A cell is convex. It holds the parts of the facets whose fronts look into it, the panels that stand in it or bound it, and
-//! the openings that lead out of it. Of the planes of its panels those with most wall are tried, and the one is taken
-//! that leaves the least (p₁ + q₁)² + (p₂ + q₂)².
+//! A cell is convex. It holds the parts of the facets whose fronts look into it, the panels that stand in it or bound
+//! it, and the openings that lead out of it. Of the planes of its panels those with most wall are tried, and the one is
+//! taken that leaves the least (p₁ + q₁)² + (p₂ + q₂)².
 
 use super::merge::Border;
 use super::polygon::{Place, Plane, area, count};

@@ -33,8 +33,8 @@ impl Plane {
         }
     }
 
-    /// The parts of a convex polygon behind the plane and before it, fewer than three corners where there is none. Corners
-    /// within `touch` of the plane belong to both.
+    /// The parts of a convex polygon behind the plane and before it, fewer than three corners where there is none.
+    /// Corners within `touch` of the plane belong to both.
     pub fn split(&self, corners: &[DVec3], touch: f64) -> [Vec<DVec3>; 2] {
         let mut parts = [Vec::with_capacity(corners.len() + 1), Vec::with_capacity(corners.len() + 1)];
         let n = corners.len();
@@ -80,8 +80,8 @@ pub fn middle(corners: &[DVec3]) -> DVec3 {
     corners.iter().sum::<DVec3>() / corners.len().max(1) as f64
 }
 
-/// A grid along the longest edge of a polygon, of cells about `size` wide: for both directions the unit vector, where it
-/// begins, the width of a cell, and their number.
+/// A grid along the longest edge of a polygon, of cells about `size` wide: for both directions the unit vector, where
+/// it begins, the width of a cell, and their number.
 fn grid(corners: &[DVec3], normal: DVec3, size: f64) -> [(DVec3, f64, f64, usize); 2] {
     let n = corners.len();
     let edge = |i: usize| corners[(i + 1) % n] - corners[i];

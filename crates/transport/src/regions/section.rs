@@ -1,8 +1,8 @@
 //! What a plane is within a cell: wall, opening, or nobody's place.
 //!
 //! Panels that go through the plane part its cross-section into *fields*, as the outlines of rooms part a plan. In each
-//! field the panels that lie in the plane are wall, the rest is open. Space from which no front of a facet is seen (solid
-//! walls, furniture, the outside of a building) is nobody's, and an opening needs somebody on both sides.
+//! field the panels that lie in the plane are wall, the rest is open. Space from which no front of a facet is seen
+//! (solid walls, furniture, the outside of a building) is nobody's, and an opening needs somebody on both sides.
 
 use super::polygon::{Place, Plane, area, middle};
 use crate::view_factors::convex_pieces;
@@ -13,8 +13,8 @@ use i_triangle::i_overlay::float::single::SingleFloatOverlay;
 use radiosity_scene::Enclosure;
 use radiosity_trace::{Ray, Tree};
 
-/// Rays to either side of an opening that look for a front of a facet. A place that sees none with 64 sees fronts in some 5 %
-/// of its directions at most; in what is not sealed it sees half its surroundings, and more rays find no more.
+/// Rays to either side of an opening that look for a front of a facet. A place that sees none with 64 sees fronts in
+/// some 5 % of its directions at most; in what is not sealed it sees half its surroundings, and more rays find no more.
 const LOOKS: usize = 64;
 
 type Contour = Vec<[f64; 2]>;
@@ -164,11 +164,12 @@ fn shape_area(shape: &Shape) -> f64 {
     0.5 * shape.iter().map(|contour| twice_area(contour)).sum::<f64>()
 }
 
-/// Half the width of a line, relative to `touch`: far above the rounding of coordinates, far below what is known of them.
+/// Half the width of a line, relative to `touch`: far above the rounding of coordinates, far below what is known of
+/// them.
 const LINE: f64 = 0.01;
 
-/// The shapes between lines, which are given a width and cut out: slicing by lines would lose loops that do not reach the
-/// rim of a shape.
+/// The shapes between lines, which are given a width and cut out: slicing by lines would lose loops that do not reach
+/// the rim of a shape.
 fn between(shapes: Vec<Shape>, lines: &[Contour], touch: f64) -> Vec<Shape> {
     let near: Vec<&Contour> = lines.iter().filter(|line| shapes.iter().any(|shape| overlap(shape, line))).collect();
     if near.is_empty() || shapes.is_empty() {

@@ -201,7 +201,8 @@ impl Building {
         }
     }
 
-    /// Σ(p + q)² of the partition by hand: a region for each room, and the doors cut into patches as wide as the elements.
+    /// Σ(p + q)² of the partition by hand: a region for each room, and the doors cut into patches as wide as the
+    /// elements.
     pub fn cost_by_hand(&self) -> f64 {
         let mut sizes = vec![0.0; self.rooms.len()];
         for room in &self.room_of {
