@@ -43,6 +43,7 @@ pub struct Space {
     tree: Tree,
     /// Triangles from this on belong to obstructions.
     fronts: u32,
+    is_closed: bool,
     pub touch: f64,
     /// The box around everything.
     pub bounds: [DVec3; 2],
@@ -58,10 +59,10 @@ impl Space {
                 fronts = triangles.len() as u32;
             }
         }
-        Space { tree: Tree::new(&triangles), fronts, touch, bounds }
+        Space { tree: Tree::new(&triangles), fronts, is_closed: enclosure.is_closed, touch, bounds }
     }
 
-    /// Whether a front is seen from `point`, looking to the side of `normal`.
+    /// Whether a front is seen, or may be, for what looks past everything in an open scene proves nothing, from `point`, looking to the side of `normal`.
     fn sees_a_front(&self, point: DVec3, normal: DVec3) -> bool {
         let (x, y) = normal.any_orthonormal_pair();
         let origin = (point + 2.0 * self.touch * normal).as_vec3();
@@ -71,7 +72,10 @@ impl Space {
             let (sin, cos) = (2.399_963_229_728_653 * k as f64).sin_cos();
             let direction = (z * normal + (1.0 - z * z).sqrt() * (cos * x + sin * y)).normalize().as_vec3();
             let ray = Ray { origin, direction, t_max: f32::INFINITY, skip: u32::MAX };
-            self.tree.closest(&ray).is_some_and(|hit| !hit.back && hit.triangle < self.fronts)
+            match self.tree.closest(&ray) {
+                Some(hit) => !hit.back && hit.triangle < self.fronts,
+                None => !self.is_closed,
+            }
         })
     }
 }
