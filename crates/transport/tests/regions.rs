@@ -219,6 +219,16 @@ fn catalogue_93_any_facets_have_regions() {
     }
     assert_each_point_in_one_region(&sheet, &find(&sheet));
     let mut random = Random::new(1);
+    // Small triangles apart in the open see each other: none is parted from the others without patches.
+    let mut sparse = Enclosure::default();
+    for _ in 0..500 {
+        let mut point = || DVec3::new(random.next_unit(), random.next_unit(), random.next_unit());
+        let (at, u, v) = (point(), 0.05 * point(), 0.05 * point());
+        sparse.add("", Facet::new(vec![at, at + u, at + v]).unwrap());
+    }
+    let found = find(&sparse);
+    assert_each_point_in_one_region(&sparse, &found);
+    assert!(found.len() == 1 || found.sizes.iter().all(|size| size.patches > 0), "{:?}", found.sizes);
     for size in [1e-6, 1.0, 1e6] {
         let mut soup = Enclosure::default();
         for i in 0..300 {

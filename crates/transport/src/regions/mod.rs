@@ -15,6 +15,9 @@
 //! without walls is one region. Planes are known within 5e-7 of the scene's diagonal, and openings narrower than that
 //! are none. What is seen of nobody's space (from which no front of a facet is seen in 64 directions) crosses no patch:
 //! a long black pipe between two rooms, active on the outside only, would be overlooked.
+//!
+//! Of an enclosure that is not said to be closed the outside counts as open space, so planes part it less. Thousands of
+//! large polygons that go through one another take time by the square.
 
 mod finish;
 mod merge;
