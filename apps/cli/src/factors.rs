@@ -22,8 +22,8 @@ pub struct Arguments {
     #[arg(short, long, value_name = "F.npz|.mtx|.csv|.txt")]
     output: Option<PathBuf>,
     /// How factors are found; `radiosity compare` shows them side by side. One of: adaptive (the default), hemicube,
-    /// hemicube-midpoint, single-plane, cubic-tetrahedron, global-cube, hemisphere, point, disc, lambert, nusselt,
-    /// contour, exact, cubature, malley, area-samples, global-lines. Of these `contour` and `exact` do not see what stands
+    /// hemicube-midpoint, single-plane, single-plane-adaptive, cubic-tetrahedron, global-cube, hemisphere, point, disc,
+    /// lambert, nusselt, contour, exact, cubature, malley, area-samples, global-lines. Of these `contour` and `exact` do not see what stands
     /// between surfaces: they are for scenes in which nothing does.
     #[arg(long, value_name = "NAME", default_value_t = FormFactorMethod::Adaptive, hide_default_value = true)]
     method: FormFactorMethod,

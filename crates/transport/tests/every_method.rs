@@ -16,7 +16,7 @@ fn options(resolution: usize) -> FormFactorOptions {
 
 fn found(method: FormFactorMethod, room: &Enclosure, resolution: usize) -> FormFactors {
     // The cells of the single plane are as wide at its rim as in the middle.
-    let finer = if method.name() == "single-plane" { 4 } else { 1 };
+    let finer = if method.name().starts_with("single-plane") { 4 } else { 1 };
     FormFactors::new(method, room, &options(finer * resolution), &()).unwrap()
 }
 

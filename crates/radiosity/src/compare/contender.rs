@@ -163,7 +163,9 @@ impl Contender {
             Contender::Method(FormFactorMethod::Row(RowMethod::Hemicube | RowMethod::HemicubeMidpoint)) => {
                 Some(3 * resolution * resolution)
             }
-            Contender::Method(FormFactorMethod::Row(RowMethod::SinglePlane)) => Some(resolution * resolution),
+            Contender::Method(FormFactorMethod::Row(RowMethod::SinglePlane | RowMethod::SinglePlaneAdaptive)) => {
+                Some(resolution * resolution)
+            }
             Contender::Method(FormFactorMethod::Row(RowMethod::GlobalCube)) => Some(3 * resolution * resolution),
             _ => None,
         };

@@ -1,27 +1,13 @@
 //! The item buffer: which polygon is seen through each cell of a window, by scan conversion in homogeneous coordinates
-//! (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates"; depth test of Catmull 1974).
+//! (Olano and Greer 1997) and the depth test of Catmull (1974, "A subdivision algorithm for computer display of curved
+//! surfaces").
 //!
-//! An edge from a to b and the eye span a plane, and the direction p = (x, y, 1) lies on its inner side where
-//! (a × b)·p ≥ 0. The directions that are inside of all edges are those that meet the convex polygon, wherever its
-//! corners lie: nothing is divided by a depth, so nothing has to be clipped, be it beside, below or behind the eye.
-//! Polygons that share an edge compute the same plane with the opposite sign, so no cell falls between them. On the plane
-//! m·X = d the reciprocal depth is m·p/d, linear over the window; the larger one is seen, of equal ones the one drawn
-//! first. It fails like any sampling: what is smaller than a cell is seen whole or not at all.
+//! Each polygon is a [`Scan`]: where it covers a cell's centre, and with which reciprocal depth. The larger one is seen, of
+//! equal ones the one drawn first. It fails like any sampling: what is smaller than a cell is seen whole or not at all.
 
 use super::face::Face;
+use super::scan::{Outline, Scan};
 use glam::DVec3;
-
-/// A back is taken to lie this much further away than it does, so that the front of a wall without thickness is seen
-/// and not its back. Far above rounding (1e-15 times how obliquely the wall is seen), far below any thickness.
-const BACK: f64 = 1.0 / (1u64 << 30) as f64;
-
-/// A convex polygon as the eye sees it: corners, and the plane m·X = d, in the frame of the face.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Outline<'a> {
-    pub corners: &'a [DVec3],
-    pub normal: DVec3,
-    pub offset: f64,
-}
 
 /// Items and reciprocal depths of the cells of a face.
 #[derive(Clone, Debug, Default)]
@@ -45,52 +31,14 @@ impl ItemBuffer {
 
     /// Draws a polygon; answers how many cells it covers, seen or not.
     pub fn draw(&mut self, face: &Face, outline: &Outline, item: u32) -> u32 {
-        let Outline { corners, normal, offset } = *outline;
-        let side = offset.signum();
         self.edges.clear();
-        self.edges.extend((0..corners.len()).map(|i| side * corners[i].cross(corners[(i + 1) % corners.len()])));
-        let scale = (if offset > 0.0 { 1.0 - BACK } else { 1.0 }) / offset;
-        let [columns, rows] = face.cells;
-        let [width, height] = face.pitch();
-        let [left, _, low, _] = face.window;
-
-        // The rows that the image reaches; all of them where a part of it lies at infinity.
-        let mut reach = [f64::INFINITY, f64::NEG_INFINITY];
-        for c in corners {
-            let row = (c.y / c.z - low) / height - 0.5;
-            reach = if c.z > 0.0 { [reach[0].min(row), reach[1].max(row)] } else { [f64::NEG_INFINITY, f64::INFINITY] };
-            if c.z <= 0.0 {
-                break;
-            }
-        }
-        // A row more at either end, as these are rounded; conversions of what is too large saturate.
-        let rows = (reach[0].floor() as usize)..rows.min((reach[1].ceil() + 1.0) as usize);
-
+        let scan = Scan::new(face, outline, item, &mut self.edges);
         let mut covered = 0;
-        for row in rows {
-            let y = low + (row as f64 + 0.5) * height;
-            let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
-            for e in &self.edges {
-                let rest = e.y * y + e.z;
-                if e.x > 0.0 {
-                    from = from.max(-rest / e.x);
-                } else if e.x < 0.0 {
-                    to = to.min(-rest / e.x);
-                } else if rest < 0.0 {
-                    to = f64::NEG_INFINITY;
-                }
-            }
-            let first = ((from - left) / width - 0.5).ceil().max(0.0);
-            let last = ((to - left) / width - 0.5).floor().min(columns as f64 - 1.0);
-            // Not a number where an edge degenerates: nothing is covered.
-            if first.is_nan() || last.is_nan() || first > last {
-                continue;
-            }
-            let (first, last) = (first as usize, last as usize);
+        for row in scan.rows.clone() {
+            let Some([first, last]) = scan.span(&self.edges, face, row) else { continue };
             covered += (last - first + 1) as u32;
-            let x = left + 0.5 * width;
-            let (start, step) = ((normal.x * x + normal.y * y + normal.z) * scale, normal.x * width * scale);
-            let cells = row * columns + first..=row * columns + last;
+            let [start, step] = scan.nearness(face, row);
+            let cells = row * face.cells[0] + first..=row * face.cells[0] + last;
             let cells = self.depths[cells.clone()].iter_mut().zip(&mut self.items[cells]);
             for (column, (depth, seen)) in (first..).zip(cells) {
                 let nearness = start + step * column as f64;

@@ -10,6 +10,7 @@
 //! everything or nothing.
 
 use glam::DVec3;
+use std::ops::Range;
 
 /// What a cell weighs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,6 +54,17 @@ impl Face {
         let inside = |at: f64, len: usize| at >= 0.0 && at < len as f64;
         let is_seen = point.z > 0.0 && inside(column, self.cells[0]) && inside(row, self.cells[1]);
         is_seen.then(|| row as usize * self.cells[0] + column as usize)
+    }
+
+    /// What a block of cells weighs together, for a facet whose normal is `normal` in the frame of the projection surface and
+    /// has the block above its horizon: the integral in closed form.
+    pub fn weight_of_block(&self, [columns, rows]: [&Range<usize>; 2], normal: DVec3) -> f64 {
+        let [width, height] = self.pitch();
+        let x = |column: usize| self.window[0] + column as f64 * width;
+        let y = |row: usize| self.window[2] + row as f64 * height;
+        let side = |row: usize| antiderivative(x(columns.end), y(row)) - antiderivative(x(columns.start), y(row));
+        let m = DVec3::from_array(self.frame.map(|axis| axis.dot(normal)));
+        m.dot(side(rows.end) - side(rows.start)) / std::f64::consts::PI
     }
 
     /// v of every cell, rows from below.

@@ -1,9 +1,11 @@
 //! One glance: all faces of a surface drawn from one eye point, and what each facet took of them.
 
-use super::buffer::{ItemBuffer, Outline};
+use super::buffer::ItemBuffer;
 use super::face::Face;
-use super::surface::Level;
+use super::scan::{Outline, Scans};
+use super::surface::{Fill, Level};
 use super::view::{Polygon, View};
+use super::warnock::{Block, LookUps, Windows};
 use glam::DVec3;
 
 /// Polygons seen more obliquely than this are lines.
@@ -36,6 +38,12 @@ pub(super) struct Scratch {
     pub tallies: Vec<Tally>,
     /// Polygons of the face between all cell centres: owner, cell and reciprocal depth of the middle.
     between: Vec<(u32, usize, f64)>,
+    /// The face's polygons, which of them each cell shows, and its windows, where cells are not filled one polygon at a time.
+    scans: Scans,
+    shown: Vec<u32>,
+    windows: Windows,
+    /// What it took to find what cells show, so far.
+    pub look_ups: LookUps,
 }
 
 /// What one eye point sees of a facet.
@@ -57,7 +65,7 @@ impl Scratch {
     pub fn glance(
         &mut self,
         (view, ahead): (&View, &[u32]),
-        (level, weights): (&Level, &[Vec<f64>]),
+        (level, weights, fill): (&Level, &[Vec<f64>], Fill),
         eye: &Eye,
         observe: Observer,
     ) {
@@ -72,14 +80,43 @@ impl Scratch {
             self.project(view, face, eye.place, &axes);
             self.buffer.clear(face, nothing);
             self.between.clear();
+            self.scans.clear();
             for polygon in ahead.iter().map(|p| &view.polygons[*p as usize]) {
-                self.draw(view, face, polygon, eye.place, &axes);
+                self.draw((view, polygon), (face, fill), eye.place, &axes);
             }
+            self.fill(face, fill, nothing);
             for (owner, cell, nearness) in self.between.drain(..) {
-                self.tallies[owner as usize].glimpsed |= nearness >= self.buffer.depths[cell];
+                let depth = match fill {
+                    Fill::Cells => self.buffer.depths[cell],
+                    _ => self.scans.depth(self.shown[cell], face, cell),
+                };
+                self.tallies[owner as usize].glimpsed |= nearness >= depth;
             }
-            tally(face, &self.buffer.items, weights, eye.share, &mut self.tallies);
-            observe(number, &self.buffer.items, weights, eye.share);
+            let items = &self.buffer.items;
+            match fill {
+                Fill::Windows => {
+                    tally_blocks((face, &self.windows.blocks), items, weights, eye.share, &mut self.tallies)
+                }
+                _ => tally(face, items, weights, eye.share, &mut self.tallies),
+            }
+            observe(number, items, weights, eye.share);
+        }
+    }
+
+    /// Finds what each cell shows, where polygons were only gathered so far.
+    fn fill(&mut self, face: &Face, fill: Fill, nothing: u32) {
+        match fill {
+            Fill::Cells => {
+                self.look_ups.places += self.buffer.items.len() as u64;
+                return;
+            }
+            Fill::Windows => {
+                self.windows.divide(face, &self.scans, &mut self.look_ups);
+                self.windows.show(face, &mut self.shown);
+            }
+        }
+        for (item, scan) in self.buffer.items.iter_mut().zip(&self.shown) {
+            *item = self.scans.item(*scan, nothing);
         }
     }
 
@@ -97,7 +134,7 @@ impl Scratch {
         }
     }
 
-    fn draw(&mut self, view: &View, face: &Face, polygon: &Polygon, eye: DVec3, axes: &[DVec3; 3]) {
+    fn draw(&mut self, (view, polygon): (&View, &Polygon), (face, fill): (&Face, Fill), eye: DVec3, axes: &[DVec3; 3]) {
         let (corners, owner, normal) = (view.corners(polygon), polygon.owner, polygon.normal);
         let codes = || corners.iter().map(|c| self.outside[*c as usize]);
         let (all, any) = (codes().fold(u8::MAX, |a, b| a & b), codes().fold(0, |a, b| a | b));
@@ -117,7 +154,14 @@ impl Scratch {
         self.outline.extend(corners.iter().map(|c| self.vertices[*c as usize]));
         let normal = DVec3::from_array(axes.map(|axis| axis.dot(normal)));
         let outline = Outline { corners: &self.outline, normal, offset };
-        let covered = self.buffer.draw(face, &outline, item);
+        let covered = match fill {
+            Fill::Cells => {
+                let covered = self.buffer.draw(face, &outline, item);
+                self.look_ups.tests += u64::from(covered);
+                covered
+            }
+            _ => self.scans.push(face, &outline, item),
+        };
         tally.drawn += covered;
         if covered == 0 && item != view.nothing() {
             let middle = self.outline.iter().sum::<DVec3>() / self.outline.len() as f64;
@@ -151,6 +195,31 @@ fn tally(face: &Face, items: &[u32], weights: &[f64], share: f64, tallies: &mut 
         let next = (row + 1) * columns;
         for (column, (item, weight)) in here.iter().zip(weigh).enumerate().take(items.len().saturating_sub(next)) {
             differ([*item, items[next + column]], weight + weights[next + column]);
+        }
+    }
+}
+
+/// The same of a face in blocks that show one polygon each, by their weights in closed form: only cells at their borders
+/// have neighbours that may show something else. Differs from [`tally`] by rounding.
+fn tally_blocks((face, blocks): (&Face, &[Block]), items: &[u32], weights: &[f64], share: f64, tallies: &mut [Tally]) {
+    let [columns, rows] = face.cells;
+    for Block { columns: across, rows: up, .. } in blocks {
+        let at = |column: usize, row: usize| row * columns + column;
+        let tally = &mut tallies[items[at(across.start, up.start)] as usize];
+        tally.value += quantised(share * face.weight_of_block([across, up], DVec3::Z));
+        tally.seen += (across.len() * up.len()) as u32;
+        let mut differ = |a: usize, b: usize| {
+            if items[a] != items[b] {
+                let doubt = 0.25 * share * (weights[a] + weights[b]);
+                tallies[items[a] as usize].doubt += doubt;
+                tallies[items[b] as usize].doubt += doubt;
+            }
+        };
+        if across.end < columns {
+            up.clone().for_each(|row| differ(at(across.end - 1, row), at(across.end, row)));
+        }
+        if up.end < rows {
+            across.clone().for_each(|column| differ(at(column, up.end - 1), at(column, up.end)));
         }
     }
 }

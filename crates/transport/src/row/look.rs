@@ -261,7 +261,8 @@ impl<'a> Gaze<'a> {
                 }
             };
             let eye = Eye { place: *place, share: *share, axes };
-            self.scratch.glance((self.view, &self.ahead), (level_of_faces, weights), &eye, observe);
+            let surface = (level_of_faces, weights.as_slice(), projection.fill());
+            self.scratch.glance((self.view, &self.ahead), surface, &eye, observe);
             self.settle(&eye, captured, &mut average);
         }
         // Doubts of turned surfaces are independent: three standard deviations of as many uniform ones.

@@ -14,6 +14,8 @@ pub enum RowMethod {
     HemicubeMidpoint,
     /// [`SinglePlane`].
     SinglePlane,
+    /// [`SinglePlane`] with cells that adapt.
+    SinglePlaneAdaptive,
     /// [`CubicTetrahedron`].
     CubicTetrahedron,
     /// [`GlobalCube`].
@@ -23,10 +25,15 @@ pub enum RowMethod {
 }
 
 /// Names and descriptions of all methods.
-const TABLE: [(RowMethod, &str, &str); 6] = [
+const TABLE: [(RowMethod, &str, &str); 7] = [
     (RowMethod::Hemicube, "hemicube", "half a cube of cells, integrated exactly (Cohen and Greenberg 1985)"),
     (RowMethod::HemicubeMidpoint, "hemicube-midpoint", "half a cube of cells, as published (Cohen and Greenberg 1985)"),
     (RowMethod::SinglePlane, "single-plane", "one plane above the facet; misses what is low (Sillion and Puech 1989)"),
+    (
+        RowMethod::SinglePlaneAdaptive,
+        "single-plane-adaptive",
+        "the same, its cells divided where facets differ (Warnock 1969; Sillion and Puech 1989)",
+    ),
     (RowMethod::CubicTetrahedron, "cubic-tetrahedron", "the corner of a cube of cells (Beran-Koehn and Pavicic 1991)"),
     (RowMethod::GlobalCube, "global-cube", "one cube of directions for all facets (Immel et al. 1986; Xu 1990)"),
     (RowMethod::Hemisphere, "hemisphere", "rays from all over the facet, cosine-distributed (Malley 1988)"),
@@ -59,6 +66,7 @@ impl RowMethod {
             RowMethod::Hemicube => Box::new(Hemicube { look, weights: Weights::Exact }),
             RowMethod::HemicubeMidpoint => Box::new(Hemicube { look, weights: Weights::Midpoint }),
             RowMethod::SinglePlane => Box::new(SinglePlane::new(look)),
+            RowMethod::SinglePlaneAdaptive => Box::new(SinglePlane::new(look).adapting()),
             RowMethod::CubicTetrahedron => Box::new(CubicTetrahedron { look }),
             RowMethod::GlobalCube => Box::new(GlobalCube { look, weights: Weights::Exact }),
             RowMethod::Hemisphere => Box::new(Hemisphere::like(&look)),

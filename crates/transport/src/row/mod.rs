@@ -16,9 +16,11 @@ mod look;
 mod matrix;
 mod method;
 pub(crate) mod points;
+mod scan;
 mod single_plane;
 mod surface;
 mod view;
+mod warnock;
 
 pub use cubic_tetrahedron::CubicTetrahedron;
 pub use face::Weights;
@@ -30,6 +32,7 @@ pub use matrix::RowMatrix;
 pub use method::{RowMethod, UnknownRowMethod};
 pub use single_plane::{HalfWidthError, SinglePlane};
 pub use surface::MOST_CELLS;
+pub use warnock::LookUps;
 
 use crate::pair::Factor;
 use crate::{Progress, Stopped};

@@ -11,6 +11,16 @@ const REFINED: usize = 1024;
 /// Most cells along a side of a projection surface: four million on a face, which are 100 MB.
 pub const MOST_CELLS: u16 = 2048;
 
+/// How cells come to show what they show.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Fill {
+    /// Polygon by polygon, into all cells that it covers.
+    #[default]
+    Cells,
+    /// Window by window, divided where polygons differ. For surfaces whose faces lie above the horizon whole.
+    Windows,
+}
+
 /// A method that projects what is around on faces.
 pub(super) trait Projection: Sync {
     fn look(&self) -> Look;
@@ -18,6 +28,9 @@ pub(super) trait Projection: Sync {
     fn faces(&self, resolution: usize) -> Vec<Face>;
     fn weights(&self) -> Weights {
         Weights::Exact
+    }
+    fn fill(&self) -> Fill {
+        Fill::Cells
     }
     /// Faces keep to the world's axes, whatever the facet's normal.
     fn is_world_aligned(&self) -> bool {

@@ -30,7 +30,7 @@ fn face_to_face(a: f64, b: f64, c: f64) -> f64 {
 }
 
 /// An L of two rooms, floor and ceiling concave.
-fn l_shaped_room() -> Enclosure {
+pub(super) fn l_shaped_room() -> Enclosure {
     let outline = [[0., 0.], [3., 0.], [3., 1.], [1., 1.], [1., 2.], [0., 2.]].map(|[x, y]| DVec3::new(x, y, 0.0));
     let mut room = Enclosure { is_closed: true, ..Enclosure::default() };
     let floor = Facet::new(outline.to_vec()).unwrap();
@@ -54,9 +54,13 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+fn is_plane(method: RowMethod) -> bool {
+    matches!(method, RowMethod::SinglePlane | RowMethod::SinglePlaneAdaptive)
+}
+
 /// Cells of the single plane are as wide at its rim as in the middle: it gets four times as many each way.
 fn made(method: RowMethod, look: Look) -> Box<dyn Row> {
-    let finer = if method == RowMethod::SinglePlane { 4 } else { 1 };
+    let finer = if is_plane(method) { 4 } else { 1 };
     method.with(Look { resolution: finer * look.resolution, ..look })
 }
 
@@ -127,7 +131,7 @@ fn catalogue_20_intuition_holds() {
         pair
     };
     let until = |tolerance: f64| Look { resolution: 64, repair: Repair::UntilError(tolerance), ..Look::default() };
-    for method in RowMethod::all().filter(|m| *m != RowMethod::SinglePlane) {
+    for method in RowMethod::all().filter(|m| !is_plane(*m)) {
         let row = method.with(until(4e-3)).row(0, &box_of(DVec3::ONE, 1));
         assert!((row.factors[1].value - OPPOSITE).abs() < 4e-3, "{method}: {row:?}");
         assert!((row.factors[4].value - ADJACENT).abs() < 4e-3, "{method}: {row:?}");
