@@ -97,7 +97,10 @@ impl Arguments {
     /// A call that means something else than it does is not carried out.
     fn refuse_what_has_no_effect(&self) -> Result<(), Failure> {
         let method = self.method;
-        let [adaptive, projects] = [method == FormFactorMethod::Adaptive, matches!(method, FormFactorMethod::Row(_))];
+        let [adaptive, projects] = [
+            method == FormFactorMethod::Adaptive,
+            matches!(method, FormFactorMethod::Row(_) | FormFactorMethod::HemicubeGpu),
+        ];
         let casts_rays = method == FormFactorMethod::Row(RowMethod::Hemisphere);
         let by_element = self.by == Some(By::Element);
         let rules = [

@@ -133,7 +133,7 @@ impl From<radiosity_transport::FactorError> for Error {
     fn from(error: radiosity_transport::FactorError) -> Self {
         match error {
             radiosity_transport::FactorError::Stopped => Error::Stopped,
-            memory => Error::Factors(memory),
+            other => Error::Factors(other),
         }
     }
 }

@@ -34,14 +34,17 @@ pub enum FormFactorMethod {
     Row(RowMethod),
     /// Pair by pair, always the same way.
     Pair(PairMethod),
+    /// The hemicube on graphics hardware, in builds with the feature `gpu`; without it, it has its name and an error.
+    HemicubeGpu,
 }
 
 impl FormFactorMethod {
-    /// All of them, the default first.
+    /// All that this build has, the default first.
     pub fn all() -> impl Iterator<Item = FormFactorMethod> {
         let rows = RowMethod::all().map(FormFactorMethod::Row);
         let pairs = PAIRS.into_iter().map(FormFactorMethod::Pair);
-        std::iter::once(FormFactorMethod::Adaptive).chain(rows).chain(pairs)
+        let gpu = cfg!(feature = "gpu").then_some(FormFactorMethod::HemicubeGpu);
+        std::iter::once(FormFactorMethod::Adaptive).chain(rows).chain(pairs).chain(gpu)
     }
 
     /// Its name.
@@ -50,6 +53,7 @@ impl FormFactorMethod {
             FormFactorMethod::Adaptive => "adaptive",
             FormFactorMethod::Row(method) => method.name(),
             FormFactorMethod::Pair(method) => method.name(),
+            FormFactorMethod::HemicubeGpu => "hemicube-gpu",
         }
     }
 
@@ -62,6 +66,7 @@ impl FormFactorMethod {
             }
             FormFactorMethod::Row(method) => method.description(),
             FormFactorMethod::Pair(method) => method.description(),
+            FormFactorMethod::HemicubeGpu => "the hemicube on graphics hardware (Cohen and Greenberg 1985)",
         }
     }
 
@@ -97,6 +102,7 @@ impl FromStr for FormFactorMethod {
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         FormFactorMethod::all()
+            .chain([FormFactorMethod::HemicubeGpu])
             .find(|m| m.name() == name)
             .ok_or_else(|| UnknownFormFactorMethod { name: name.to_owned() })
     }
@@ -135,7 +141,8 @@ impl FormFactors {
     ///
     /// # Errors
     /// [`FactorError::Stopped`] if `progress` says so; [`FactorError::Memory`] where `options.adaptive.memory` does not
-    /// suffice, at once for methods that fill a whole matrix.
+    /// suffice, at once for methods that fill a whole matrix; [`FactorError::Gpu`] where `hemicube-gpu` is asked for and
+    /// cannot be had.
     pub fn new(
         method: FormFactorMethod,
         enclosure: &Enclosure,
@@ -155,6 +162,13 @@ impl FormFactors {
                 Ok(FormFactors::from_rows(enclosure, matrix))
             }
             FormFactorMethod::Pair(pair) => Ok(by_pairs(pair, enclosure, progress)?),
+            #[cfg(feature = "gpu")]
+            FormFactorMethod::HemicubeGpu => {
+                let hemicube = crate::row::HemicubeGpu::open(options.look)?;
+                Ok(FormFactors::from_rows(enclosure, hemicube.matrix(enclosure, progress)?))
+            }
+            #[cfg(not(feature = "gpu"))]
+            FormFactorMethod::HemicubeGpu => Err(crate::row::GpuError::NotBuilt.into()),
         }
     }
 

@@ -106,7 +106,7 @@ impl Contender {
         match self {
             Contender::Rays | Contender::Method(FormFactorMethod::Row(RowMethod::Hemisphere)) => Kind::Sampling,
             Contender::Method(FormFactorMethod::Adaptive) => Kind::Adaptive,
-            Contender::Method(FormFactorMethod::Row(_)) => Kind::Projection,
+            Contender::Method(FormFactorMethod::Row(_) | FormFactorMethod::HemicubeGpu) => Kind::Projection,
             Contender::Method(FormFactorMethod::Pair(_)) => Kind::Pair,
         }
     }
@@ -126,7 +126,7 @@ impl Contender {
                 all.insert(2, Setting::Cells { resolution: 64, points: POINTS });
                 all
             }
-            Contender::Method(FormFactorMethod::Row(_)) => cells(1).to_vec(),
+            Contender::Method(FormFactorMethod::Row(_) | FormFactorMethod::HemicubeGpu) => cells(1).to_vec(),
             Contender::Method(FormFactorMethod::Pair(_)) => vec![Setting::Only],
         }
     }
@@ -160,9 +160,10 @@ impl Contender {
     /// Rays or cells of a row, where there are any.
     pub(super) fn samples(self, setting: Setting) -> Option<usize> {
         let share = |resolution: usize| match self {
-            Contender::Method(FormFactorMethod::Row(RowMethod::Hemicube | RowMethod::HemicubeMidpoint)) => {
-                Some(3 * resolution * resolution)
-            }
+            Contender::Method(
+                FormFactorMethod::Row(RowMethod::Hemicube | RowMethod::HemicubeMidpoint)
+                | FormFactorMethod::HemicubeGpu,
+            ) => Some(3 * resolution * resolution),
             Contender::Method(FormFactorMethod::Row(RowMethod::SinglePlane | RowMethod::SinglePlaneAdaptive)) => {
                 Some(resolution * resolution)
             }

@@ -114,6 +114,7 @@ impl Scratch {
                 self.windows.divide(face, &self.scans, &mut self.look_ups);
                 self.windows.show(face, &mut self.shown);
             }
+            Fill::By(raster) => raster.fill(face, &self.scans, &mut self.shown),
         }
         for (item, scan) in self.buffer.items.iter_mut().zip(&self.shown) {
             *item = self.scans.item(*scan, nothing);

@@ -10,6 +10,7 @@ mod cubic_tetrahedron;
 mod face;
 mod glance;
 mod global_cube;
+mod gpu;
 mod hemicube;
 mod hemisphere;
 mod look;
@@ -25,6 +26,9 @@ mod warnock;
 pub use cubic_tetrahedron::CubicTetrahedron;
 pub use face::Weights;
 pub use global_cube::{DirectionalRow, GlobalCube};
+pub use gpu::GpuError;
+#[cfg(feature = "gpu")]
+pub use gpu::HemicubeGpu;
 pub use hemicube::Hemicube;
 pub use hemisphere::Hemisphere;
 pub use look::{Look, Repair};

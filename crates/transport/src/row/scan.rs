@@ -32,6 +32,9 @@ pub(super) struct Scan {
     pub edges: Range<usize>,
     /// Nearness at p is `plane`·p.
     pub plane: DVec3,
+    /// It is seen from behind, so its nearness is a little less than it is.
+    #[cfg(feature = "gpu")]
+    pub is_back: bool,
     /// Rows of the face that the image reaches.
     pub rows: Range<usize>,
 }
@@ -56,7 +59,14 @@ impl Scan {
         }
         // A row more at either end, as these are rounded; conversions of what is too large saturate.
         let rows = (reach[0].floor() as usize)..face.cells[1].min((reach[1].ceil() + 1.0) as usize);
-        Scan { item, edges: start..edges.len(), plane: normal * scale, rows }
+        Scan {
+            item,
+            edges: start..edges.len(),
+            plane: normal * scale,
+            #[cfg(feature = "gpu")]
+            is_back: offset > 0.0,
+            rows,
+        }
     }
 
     /// The first and the last cell of a row whose centres the polygon covers.
@@ -107,17 +117,24 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) struct Scans {
     pub list: Vec<Scan>,
     pub edges: Vec<DVec3>,
+    /// The corner at which each edge starts.
+    #[cfg(feature = "gpu")]
+    pub corners: Vec<DVec3>,
 }
 
 impl Scans {
     pub fn clear(&mut self) {
         self.list.clear();
         self.edges.clear();
+        #[cfg(feature = "gpu")]
+        self.corners.clear();
     }
 
     /// Adds a polygon; answers how many cells it covers.
     pub fn push(&mut self, face: &Face, outline: &Outline, item: u32) -> u32 {
         let scan = Scan::new(face, outline, item, &mut self.edges);
+        #[cfg(feature = "gpu")]
+        self.corners.extend(outline.corners);
         let covered = scan.covered(&self.edges, face);
         self.list.push(scan);
         covered

@@ -105,7 +105,7 @@ impl Projection for SinglePlane {
         faces
     }
 
-    fn fill(&self) -> Fill {
+    fn fill(&self) -> Fill<'_> {
         if self.adaptive { Fill::Windows } else { Fill::Cells }
     }
 

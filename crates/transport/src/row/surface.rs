@@ -2,6 +2,7 @@
 
 use super::face::{Face, Weights};
 use super::look::Look;
+use super::scan::Scans;
 use glam::DVec3;
 use std::sync::OnceLock;
 
@@ -12,13 +13,22 @@ const REFINED: usize = 1024;
 pub const MOST_CELLS: u16 = 2048;
 
 /// How cells come to show what they show.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) enum Fill {
+#[derive(Clone, Copy, Default)]
+pub(super) enum Fill<'a> {
     /// Polygon by polygon, into all cells that it covers.
     #[default]
     Cells,
     /// Window by window, divided where polygons differ. For surfaces whose faces lie above the horizon whole.
     Windows,
+    /// All polygons at once, by somebody else.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only graphics hardware does"))]
+    By(&'a dyn Raster),
+}
+
+/// Finds what cells show.
+pub(super) trait Raster: Sync {
+    /// Writes down which of the polygons each cell of the face shows; [`super::scan::NONE`] if none.
+    fn fill(&self, face: &Face, scans: &Scans, shown: &mut Vec<u32>);
 }
 
 /// A method that projects what is around on faces.
@@ -29,7 +39,7 @@ pub(super) trait Projection: Sync {
     fn weights(&self) -> Weights {
         Weights::Exact
     }
-    fn fill(&self) -> Fill {
+    fn fill(&self) -> Fill<'_> {
         Fill::Cells
     }
     /// Faces keep to the world's axes, whatever the facet's normal.

@@ -26,6 +26,7 @@ pub use closure::{Closure, Repair};
 pub(crate) use store::Entry;
 pub use store::ViewFactors;
 
+use crate::row::GpuError;
 use crate::{Progress, Stopped};
 use clear::clear;
 use cluster::Clusters;
@@ -54,7 +55,7 @@ pub struct ViewFactorOptions {
 }
 
 /// Why there are no factors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FactorError {
     /// The run was stopped.
     #[error("stopped on request")]
@@ -70,6 +71,9 @@ pub enum FactorError {
         /// Bytes allowed.
         allowed: usize,
     },
+    /// Graphics hardware draws nothing.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
 }
 
 impl From<Stopped> for FactorError {
@@ -177,7 +181,7 @@ pub fn view_factors(
         }
         let so_far = found.fetch_add(walk.entries.len(), Ordering::Relaxed) + walk.entries.len();
         if so_far.saturating_mul(BYTES) > options.memory {
-            return Err(too_much);
+            return Err(too_much.clone());
         }
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         progress.step(done, blocks.len()).then_some((walk.entries, walk.choices)).ok_or(FactorError::Stopped)
