@@ -23,8 +23,9 @@ pub struct Arguments {
     output: Option<PathBuf>,
     /// How factors are found; `radiosity compare` shows them side by side. One of: adaptive (the default), hemicube,
     /// hemicube-midpoint, single-plane, single-plane-adaptive, cubic-tetrahedron, global-cube, hemisphere, point, disc,
-    /// lambert, nusselt, contour, exact, cubature, malley, area-samples, global-lines. Of these `contour` and `exact` do not see what stands
-    /// between surfaces: they are for scenes in which nothing does.
+    /// lambert, nusselt, contour, exact, cubature, malley, area-samples, global-lines; hemicube-gpu in
+    /// builds with the feature `gpu`. Of these `contour` and `exact` do not see what stands between surfaces: they are for
+    /// scenes in which nothing does.
     #[arg(long, value_name = "NAME", default_value_t = FormFactorMethod::Adaptive, hide_default_value = true)]
     method: FormFactorMethod,
     /// Which triangles of a .glb, .gltf or .obj are one surface; those of an object by default. A .vs3 has its own.

@@ -73,9 +73,9 @@ pub struct SolveArguments {
     #[arg(long, default_value = "4G", value_name = "BYTES", allow_hyphen_values = true, value_parser = numbers::bytes)]
     pub memory: usize,
     /// How light between elements is found: rays, the default, or one of adaptive, hemicube, hemicube-midpoint, single-plane,
-    /// single-plane-adaptive, cubic-tetrahedron, global-cube, hemisphere, point, disc, lambert, nusselt, contour, exact, cubature, malley,
-    /// area-samples, global-lines. These fill a matrix that grows with the square of the elements, two thousand if no
-    /// --element-size is given. Of them `contour` and `exact` do not see what stands between elements: light goes through
+    /// single-plane-adaptive, cubic-tetrahedron, global-cube, hemisphere, point, disc, lambert, nusselt, contour, exact,
+    /// cubature, malley, area-samples, global-lines; hemicube-gpu in builds with the feature `gpu`. These fill a matrix that
+    /// grows with the square of the elements, two thousand if no --element-size is given. Of them `contour` and `exact` do not see what stands between elements: light goes through
     /// furniture. Light of lamps and sky is found the same way in either case.
     #[arg(long = "ff", value_name = "NAME", default_value = "rays", hide_default_value = true, value_parser = numbers::form_factors)]
     pub form_factors: FormFactors,

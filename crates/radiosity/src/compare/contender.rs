@@ -78,9 +78,10 @@ const RESOLUTIONS: [usize; 4] = [64, 128, 256, 512];
 const POINTS: usize = 4;
 
 impl Contender {
-    /// All of them, the engine's own first.
+    /// All that run on any machine, the engine's own first: graphics hardware takes part where it is named.
     pub fn all() -> impl Iterator<Item = Contender> {
-        std::iter::once(Contender::Rays).chain(FormFactorMethod::all().map(Contender::Method))
+        let methods = FormFactorMethod::all().filter(|method| *method != FormFactorMethod::HemicubeGpu);
+        std::iter::once(Contender::Rays).chain(methods.map(Contender::Method))
     }
 
     /// Its name.
@@ -200,7 +201,8 @@ impl FromStr for Contender {
     type Err = UnknownContender;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Contender::all().find(|c| c.name() == name).ok_or_else(|| UnknownContender { name: name.to_owned() })
+        let mut all = Contender::all().chain([Contender::Method(FormFactorMethod::HemicubeGpu)]);
+        all.find(|c| c.name() == name).ok_or_else(|| UnknownContender { name: name.to_owned() })
     }
 }
 

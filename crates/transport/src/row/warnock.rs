@@ -1,9 +1,9 @@
 //! What a face shows, by dividing it where polygons differ (Warnock 1969, "A hidden surface algorithm for computer generated
 //! halftone pictures"; as Sillion and Puech 1989 divide their plane; catalogue 25).
 //!
-//! A window in which no polygon lies, or in front of all others one that covers it whole, is done; others are quartered, down
-//! to single cells, which are asked as the item buffer asks them. All questions are about cell centres: what holds of the
-//! four outermost of a window holds of all between them, as polygons are convex and reciprocal depth is linear. Answers that
+//! A window in which no polygon lies, or in front of all others one that covers it whole, is done; others are quartered,
+//! down to single cells, which are asked as the item buffer asks them. All questions are about cell centres: what holds of
+//! the four outermost of a window holds of all between them, as polygons are convex and reciprocal depth is linear. Answers that
 //! rounding could turn are no answers: the window is divided. So every cell shows what it shows in the buffer. It pays where
 //! polygons are larger than cells: windows are then as many as there are cells along edges, which grow with n and not n².
 
@@ -19,7 +19,7 @@ const DOUBTFUL: f64 = 1e-12;
 pub struct LookUps {
     /// Cells or windows for which it was found what they show.
     pub places: u64,
-    /// Questions whether, and how near, a polygon lies in one of them; of cells those that it covers, as others are not asked.
+    /// Questions whether, and how near, a polygon lies in one of them; of cells those that it covers: no others are asked.
     pub tests: u64,
 }
 
