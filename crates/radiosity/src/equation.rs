@@ -66,7 +66,7 @@ struct Way {
     sweeps: f64,
     first: Option<f64>,
     done: usize,
-    begun: Instant,
+    begun: Option<(Instant, f64)>,
     /// Whether it has been told how long it takes.
     is_told: bool,
 }
@@ -89,18 +89,19 @@ impl Way {
         let mean = reflectance.iter().sum::<f64>() / reflectance.len().max(1) as f64;
         // Light that hardly comes to rest is expected to take a hundred sweeps or so.
         let sweeps = tolerance.ln() / mean.clamp(0.1, 0.9).ln();
-        Way { is_random, tolerance, sweeps, first: None, done: 0, begun: Instant::now(), is_told: false }
+        Way { is_random, tolerance, sweeps, first: None, done: 0, begun: None, is_told: false }
     }
 
     /// The seconds that a solver is going to take, told once, in its first seconds, if they are many: by the work so far, of
     /// that which light with this reflectance needs. Random methods take what their noise needs, which nobody knows.
     fn slow(&mut self, info: &Info) -> Option<f64> {
-        let passed = self.begun.elapsed().as_secs_f64();
-        if self.is_told || self.is_random || passed < KNOWN || info.work <= 0.0 {
+        let (begun, work) = *self.begun.get_or_insert_with(|| (Instant::now(), info.work));
+        let passed = begun.elapsed().as_secs_f64();
+        if self.is_told || self.is_random || passed < KNOWN || info.work <= work {
             return None;
         }
         self.is_told = true;
-        Some(passed * (self.sweeps / info.work - 1.0)).filter(|seconds| *seconds > SHORT)
+        Some(passed * (self.sweeps - info.work) / (info.work - work)).filter(|seconds| *seconds > SHORT)
     }
 
     /// Parts of [`PARTS`] done, never fewer than before, as a residual may rise for a while.
@@ -161,7 +162,10 @@ pub(crate) fn solve(
         if !monitor.step(way.done(info), PARTS) {
             return Go::Stop;
         }
-        if let Some(seconds) = way.slow(info) {
+        // The count of sweeps is that of plain ones, far too many for the default.
+        if solver != Solver::DeflatedJacobi
+            && let Some(seconds) = way.slow(info)
+        {
             monitor.warn(&format!(
                 "{solver} will take about {} for {} elements; deflated-jacobi, the default, takes moments",
                 duration(seconds),

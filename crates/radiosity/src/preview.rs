@@ -12,7 +12,7 @@ use radiosity_transport::Shadowing;
 use radiosity_view::{Field, Picture, ViewRays};
 use rayon::prelude::*;
 
-/// Cells of the first pictures, on top of one per triangle: a tenth of what an answer has.
+/// Cells of the first pictures, on top of one per triangle: a third of what an answer is begun with.
 const CELLS: usize = 3000;
 
 /// Rays per cell at which first pictures end; more would take longer than they are looked at.
@@ -63,7 +63,11 @@ pub fn preview(tracer: &Tracer, options: &SolveOptions, monitor: &dyn Monitor) -
     let mut solution = Solution::begin(tracer, &coarse, monitor)?;
     let mut rays = FIRST_RAYS;
     while rays <= MOST_RAYS {
-        solution.refine(rays, monitor)?;
+        match solution.refine(rays, monitor) {
+            // The answer may still fit, with fewer rays.
+            Err(Error::Memory { .. }) => break,
+            done => done?,
+        }
         rays *= 2;
     }
     Ok(())

@@ -399,9 +399,8 @@ impl<'a> Solution<'a> {
     /// B − X: what luminaires carry, E's part and ρ times what is read of their light beyond what the equation has.
     fn screen(&self) -> Screen {
         let apart = |i: usize| -> Bands {
-            let beyond = |i: usize, k: usize| self.columns.mean(i)[k] - self.columns.seen(i)[k];
-            let passed = |k: usize| self.sheets.passed(i).map_or(0.0, |(other, tau)| tau[k] * beyond(other, k));
-            std::array::from_fn(|k| self.luminaires.promoted[i][k] + self.reflectance[i][k] * beyond(i, k) + passed(k))
+            let (seen, read) = (self.columns.seen(i), self.columns.mean(i));
+            std::array::from_fn(|k| self.luminaires.promoted[i][k] + self.reflectance[i][k] * (read[k] - seen[k]))
         };
         Screen { apart: (0..self.elements.len()).map(apart).collect(), weight: self.exposed_area() }
     }

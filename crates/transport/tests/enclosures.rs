@@ -336,6 +336,54 @@ fn many_plates_that_overlap_are_one_shadow() {
     assert!(one.value > 0.02 && (many.value - one.value).abs() <= many.error + one.error + 1e-4, "{many:?}, {one:?}");
 }
 
+/// A disc of a hundred corners hides what one of forty-eight does, but for its rim.
+#[test]
+fn round_tables_hide_as_what_they_are() {
+    let hidden = |corners: usize| {
+        let mut scene = Enclosure::default();
+        scene.add("floor", facet(&[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]));
+        scene.add("ceiling", facet(&[[0., 0., 1.], [0., 1., 1.], [1., 1., 1.], [1., 0., 1.]]));
+        let open = solve(&scene, 1e-6).factor(0, 1).value;
+        let corner = |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / corners as f64;
+            [0.5 + 0.3 * angle.cos(), 0.5 + 0.3 * angle.sin(), 0.5]
+        };
+        scene.obstructions.push(facet(&(0..corners).map(corner).collect::<Vec<_>>()));
+        open - solve(&scene, 1e-5).factor(0, 1).value
+    };
+    let (fine, coarse) = (hidden(100), hidden(48));
+    assert!(coarse > 0.05 && (fine / coarse - 1.0).abs() < 5e-3, "{fine}, {coarse}");
+}
+
+/// Slats whose planes cut a floor into more pieces than it is cut into: none loses its shadow.
+#[test]
+fn more_planes_than_pieces_lose_no_shadow() {
+    let slat = |at: f64, axis: usize| {
+        let point = |along: f64, z: f64| if axis == 0 { [at, along, z] } else { [along, at, z] };
+        facet(&[point(0.1, 0.45), point(0.9, 0.45), point(0.9, 0.55), point(0.1, 0.55)])
+    };
+    let square = |z: f64, low: [f64; 2], size: f64| {
+        let [x, y] = low;
+        [[x, y, z], [x + size, y, z], [x + size, y + size, z], [x, y + size, z]]
+    };
+    let slats: Vec<Facet> = (0..20).map(|k| slat(0.07 + 0.09 * f64::from(k / 2), k as usize % 2)).collect();
+    let factor = |n: usize| {
+        let mut scene = Enclosure::default();
+        let mut ceiling = square(1.0, [0.0; 2], 1.0);
+        ceiling.reverse();
+        scene.add("ceiling", facet(&ceiling));
+        for k in 0..n * n {
+            let low = [k % n, k / n].map(|i| i as f64 / n as f64);
+            scene.add("floor", facet(&square(0.0, low, 1.0 / n as f64)));
+        }
+        scene.obstructions = slats.clone();
+        let factors = solve(&scene, 2e-3);
+        (1..scene.facets.len()).map(|i| factors.factor(0, i)).fold((0.0, 0.0), |(v, e), f| (v + f.value, e + f.error))
+    };
+    let (whole, parts) = (factor(1), factor(3));
+    assert!((whole.0 - parts.0).abs() <= whole.1 + parts.1 && whole.1 < 4e-3, "{whole:?}, {parts:?}");
+}
+
 /// Where a wall is missing, what is known stays and the gap is told.
 #[test]
 fn the_repair_does_not_close_a_gap() {

@@ -8,7 +8,7 @@ use super::clear::Exchange;
 /// Share of the tolerance by which places may miss the closed form of all.
 const MISS: f64 = 0.1;
 
-/// Cells at which the division ends, whatever the error: some hundred thousand places, a tenth of a second.
+/// Cells from which on nothing more is divided, whatever the error: some hundred thousand places, a tenth of a second.
 const MOST: usize = 65_536;
 
 /// Integrates over the pieces of a polygon past the panels listed until the error meets the tolerance, or the cells run out.
@@ -17,6 +17,9 @@ pub fn integrate(pieces: &[Piece], (whole, tolerance): (f64, f64), shaded: &mut 
     let is_steep = shaded.is_steep();
     let mut domain = Domain::new(pieces, shaded);
     let mut cells = domain.whole(list, false);
+    if cells.iter().all(Cell::is_hidden) {
+        return Exchange::default();
+    }
     let mut missed = (cells.iter().map(|c| c.values[0] + c.values[1]).sum::<f64>() - whole).abs();
     if missed > MISS * tolerance || is_steep {
         missed = 0.0;

@@ -19,7 +19,7 @@ use glam::DVec3;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
-/// Halvings of an edge at most: 2^-12 of it is below what any accuracy needs.
+/// Halvings of an edge on the grid; cells of two of its lines are divided no more, below what any accuracy needs.
 pub const DEPTH: i32 = 12;
 
 /// Least error by the difference of the corners where a shadow begins or ends in the cell. Where its edge halves a
@@ -37,7 +37,7 @@ const UNDIVIDED: f64 = 2.0;
 /// Error of what places did not see hidden, by what might be at most.
 const DOUBT: f64 = 0.25;
 
-/// The same of what they did not see visible past several panels, by all that there is; a sixteenth with each division.
+/// The same of what they did not see visible, by all that there is; a sixteenth with each division.
 const GAP: f64 = 0.1;
 
 /// What may be is no more than this times the most that a place saw.
@@ -110,6 +110,11 @@ impl Cell {
     /// Estimate of the error of either value.
     pub fn error(&self) -> f64 {
         self.error + self.doubt
+    }
+
+    /// Whether all is proven to be hidden.
+    pub fn is_hidden(&self) -> bool {
+        self.before.is_none() && self.values[0] == 0.0
     }
 
     /// Whether its division would tell more.
@@ -190,7 +195,7 @@ pub struct Domain<'a, S> {
     shaded: &'a mut S,
     /// Whether cells take the closed form of all that they see.
     is_known: bool,
-    /// By the side and the place, on a grid finer than the cells: pieces share corners.
+    /// By the side and the place, on a grid that is finer than the cells of all but the narrowest pieces: pieces share corners.
     sights: FxHashMap<(u16, [i32; 3]), Sight>,
     /// Lines of that grid in a metre.
     grid: f64,
@@ -276,7 +281,7 @@ impl<'a, S: Shaded> Domain<'a, S> {
     /// A cell of which all is proven to be visible (0) or hidden (1).
     fn settled(&mut self, mut cell: Cell, shape: &Frame, k: usize) -> Cell {
         let Exchange { value, error } = self.shaded.whole(shape);
-        (cell.values[k], cell.error) = (value, error);
+        (cell.values[k], cell.error) = (value, if k == 0 { error } else { 0.0 });
         cell
     }
 
@@ -297,9 +302,9 @@ impl<'a, S: Shaded> Domain<'a, S> {
         cell.values = seen;
         if self.is_known {
             // The closed form, of which the places tell the share.
-            let whole = self.shaded.whole(shape).value;
+            let Exchange { value: whole, error } = self.shaded.whole(shape);
             cell.values = [share * whole, (1.0 - share) * whole];
-            cell.doubt = (whole - all).abs() * (UNKNOWN + share.min(1.0 - share));
+            cell.doubt = error + (whole - all).abs() * (UNKNOWN + share.min(1.0 - share));
             // Where all changes from place to place, its share is no plain mean.
             let high = places.corners.iter().map(Place::all).fold(0.0, f64::max);
             bend = bend.max(KINK * if high > 0.0 { places.range(Place::all) / high } else { 1.0 });

@@ -43,7 +43,7 @@ pub fn clear(a: &Part, b: &Part, tolerance: f64, cut: bool) -> (Exchange, Order)
     match bounds.order(tolerance).filter(|_| !cut) {
         Some((order, error)) => {
             let normals = [a.shape.normal(), b.shape.normal()];
-            (Exchange { value: cubature(a.rule(order), b.rule(order), normals), error }, order)
+            (Exchange { value: cubature(a.rule(order), b.rule(order), normals).max(0.0), error }, order)
         }
         None => (closed_form(&a.shape, &b.shape), 0),
     }
@@ -59,7 +59,7 @@ pub fn clear_frame(frame: &Frame, normal: DVec3, b: &Part, tolerance: f64) -> Ex
     };
     match bounds.order(tolerance) {
         Some((order, error)) => {
-            let value = cubature(&frame.rule(order), b.rule(order), [normal, b.shape.normal()]);
+            let value = cubature(&frame.rule(order), b.rule(order), [normal, b.shape.normal()]).max(0.0);
             Exchange { value, error }
         }
         None => Facet::new(frame.corners().to_vec()).map_or(Exchange::default(), |shape| closed_form(&shape, &b.shape)),

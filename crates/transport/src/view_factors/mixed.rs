@@ -14,7 +14,7 @@ use super::frame::Frame;
 use super::panel::Panel;
 use super::part::Part;
 use super::shaft::{Look, Shaft, Stands};
-use super::sides::{Sides, sides};
+use super::sides::{Seen, Sides, sides};
 use super::solid::{Obstacles, looks_away};
 use super::visible::{Loop, Shadows, Sight, keep_above, lambert};
 use glam::DVec3;
@@ -59,7 +59,8 @@ pub fn mixed(
     let is_whole = inner.shape.corners() == &target[..];
     let mut view = View {
         shadows,
-        panels,
+        setting,
+        bodies: &bodies,
         body_of: &body_of,
         sides: &sides,
         from: from.corners(),
@@ -84,11 +85,12 @@ fn distance(part: &Part, panels: &[&Panel]) -> f64 {
 /// What a part sees of another past panels.
 struct View<'a> {
     shadows: &'a mut Shadows,
-    panels: &'a [&'a Panel],
+    setting: Setting<'a>,
+    bodies: &'a [Body],
     /// The body that a panel belongs to.
     body_of: &'a [u16],
     /// Bodies as seen from each side.
-    sides: &'a [Vec<Option<Occluder>>],
+    sides: &'a [Vec<Seen>],
     /// Where from.
     from: &'a [DVec3],
     middle: DVec3,
@@ -119,7 +121,14 @@ impl Shaded for View<'_> {
         bodies.sort_unstable();
         bodies.dedup();
         let side = &self.sides[side as usize];
-        let occluders = bodies.iter().filter_map(|k| side[*k as usize].as_ref().map(|o| (*k, o)));
+        let varying = bodies.iter().filter(|k| matches!(side[**k as usize], Seen::Varying));
+        let varying: SmallVec<[(u16, Occluder); 1]> =
+            varying.filter_map(|k| Some((*k, Occluder::new(self.bodies[*k as usize], self.setting, place)?))).collect();
+        let fixed = bodies.iter().filter_map(|k| match &side[*k as usize] {
+            Seen::As(occluder) => Some((*k, occluder)),
+            _ => None,
+        });
+        let occluders = fixed.chain(varying.iter().map(|(k, occluder)| (*k, occluder)));
         self.shadows.sight((self.inside(place), self.normal), self.target, occluders, self.touch)
     }
 
@@ -129,13 +138,13 @@ impl Shaded for View<'_> {
 
     fn before(&mut self, corners: &[DVec3], list: &[u16]) -> List {
         let mut shaft = self.shaft(corners);
-        let stands = |k: &u16| shaft.stands(self.panels[*k as usize], Look::Rough) != Stands::Aside;
+        let stands = |k: &u16| shaft.stands(self.setting.panels[*k as usize], Look::Rough) != Stands::Aside;
         list.iter().copied().filter(stands).collect()
     }
 
     fn is_clear(&mut self, corners: &[DVec3], list: &[u16]) -> bool {
         let mut shaft = self.shaft(corners);
-        list.iter().all(|k| shaft.stands(self.panels[*k as usize], Look::Close) == Stands::Aside)
+        list.iter().all(|k| shaft.stands(self.setting.panels[*k as usize], Look::Close) == Stands::Aside)
     }
 
     fn possible(&mut self, corners: &[DVec3], list: &[u16], without: u64) -> f64 {
@@ -143,7 +152,7 @@ impl Shaded for View<'_> {
         let mut shaft = self.shaft(corners);
         let mut sum = 0.0;
         for &k in list.iter().filter(|k| bit(self.body_of[**k as usize]) & without == 0) {
-            let panel = self.panels[k as usize];
+            let panel = self.setting.panels[k as usize];
             let mut part = shaft.part_of(panel);
             if panel.height(centre) < 0.0 {
                 part.reverse();

@@ -311,7 +311,7 @@ impl Walk<'_> {
         } else {
             self.choices.clipped += 1;
             let obstacles = Obstacles { panels: self.panels, solids: self.solids };
-            let tolerance = tolerance - whole.error;
+            let tolerance = (tolerance - whole.error).max(0.5 * tolerance);
             mixed(&mut self.shadows, [a, b], (&mut panels, obstacles), whole, tolerance, self.touch)
         };
         if exchange.value > 0.0 || exchange.error > 0.0 {

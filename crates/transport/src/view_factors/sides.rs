@@ -9,6 +9,7 @@
 use super::body::{Body, Line, Occluder, Setting};
 use super::cell::Piece;
 use super::frame::Frame;
+use super::panel::Panel;
 use super::visible::{Loop, keep_above};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -19,7 +20,7 @@ const PARALLEL: f64 = 1e-6;
 /// Pieces narrower than this, relative to the whole, are not cut off.
 const NARROW: f64 = 1e-5;
 
-/// Bodies up to which their edges are held against each other's.
+/// Bodies in a list up to which their edges are held against each other's.
 const FEW: usize = 6;
 
 /// Pieces beyond which no more are cut.
@@ -98,8 +99,25 @@ fn meeting(piece: &[DVec3], edge: &Line, of_target: &Line, size: f64) -> Option<
 pub struct Sides {
     /// The pieces.
     pub pieces: Vec<Piece>,
-    /// The bodies as seen from each side, in their order; none where one hides nothing.
-    pub sides: Vec<Vec<Option<Occluder>>>,
+    /// The bodies as seen from each side, in their order.
+    pub sides: Vec<Vec<Seen>>,
+}
+
+/// A body as seen from a side.
+#[expect(clippy::large_enum_variant, reason = "nearly all are of the large kind")]
+pub enum Seen {
+    /// It hides nothing of the target.
+    Nothing,
+    /// The same from all places.
+    As(Occluder),
+    /// The side is still crossed by the plane of a face, as there were too many to cut by.
+    Varying,
+}
+
+impl Seen {
+    fn edges(&self) -> &[Line] {
+        if let Seen::As(occluder) = self { &occluder.edges } else { &[] }
+    }
 }
 
 /// Cuts a convex polygon of a size (m) by the planes of faces that cross it, and then where edges of bodies meet
@@ -115,7 +133,16 @@ pub fn sides(from: &[DVec3], size: f64, bodies: &[Body], setting: Setting) -> Si
     let mut found = Sides { pieces: Vec::new(), sides: Vec::new() };
     for piece in pieces {
         let centre = piece.iter().sum::<DVec3>() / piece.len() as f64;
-        let side: Vec<Option<Occluder>> = bodies.iter().map(|body| Occluder::new(*body, setting, centre)).collect();
+        let crosses = |face: &Panel| {
+            let (low, high) = range(&piece, face.normal, face.offset);
+            low < -NARROW * size && high > NARROW * size
+        };
+        let seen = |body: &Body| match Occluder::new(*body, setting, centre) {
+            _ if body.faces(setting).any(crosses) => Seen::Varying,
+            Some(occluder) => Seen::As(occluder),
+            None => Seen::Nothing,
+        };
+        let side: Vec<Seen> = bodies.iter().map(seen).collect();
         let mut parts = vec![piece.clone()];
         for plane in meetings(&piece, size, &side, &outline) {
             cut(&mut parts, plane, size);
@@ -129,12 +156,12 @@ pub fn sides(from: &[DVec3], size: f64, bodies: &[Body], setting: Setting) -> Si
 }
 
 /// The planes in which edges of bodies meet the target's, and those of other bodies while they are few.
-fn meetings(piece: &[DVec3], size: f64, side: &[Option<Occluder>], outline: &[Line]) -> SmallVec<[Plane; 16]> {
+fn meetings(piece: &[DVec3], size: f64, side: &[Seen], outline: &[Line]) -> SmallVec<[Plane; 16]> {
     let mut planes = SmallVec::new();
     for (k, occluder) in side.iter().enumerate() {
         let before = if side.len() <= FEW { &side[..k] } else { &[] };
-        let others = || before.iter().flatten().flat_map(|other| &other.edges);
-        for edge in occluder.iter().flat_map(|occluder| &occluder.edges) {
+        let others = || before.iter().flat_map(Seen::edges);
+        for edge in occluder.edges() {
             planes.extend(outline.iter().filter_map(|other| meeting(piece, edge, other, size)));
             planes.extend(
                 others().filter_map(|other| {
@@ -149,7 +176,6 @@ fn meetings(piece: &[DVec3], size: f64, side: &[Option<Occluder>], outline: &[Li
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view_factors::panel::Panel;
     use crate::view_factors::solid::{Obstacles, find_solids};
 
     fn square(z: f64, low: f64, high: f64) -> Vec<DVec3> {

@@ -73,8 +73,8 @@ pub enum Sight {
 
 impl Shadows {
     /// F from the differential area at `x` with unit `normal` to what is visible of the convex polygon `target`, which
-    /// lies above its horizon and faces it, and to what is hidden, past occluders, each with its number. Those within
-    /// `touch` of x hide nothing.
+    /// lies above its horizon and faces it, and to what is hidden, past occluders, each with its number. Those with all faces
+    /// that look at x in planes within `touch` of it hide nothing.
     pub fn sight<'a>(
         &mut self,
         (x, normal): (DVec3, DVec3),
@@ -125,9 +125,11 @@ fn throw(x: DVec3, occluder: &Occluder, touch: f64, planes: &mut Vec<Plane>) -> 
         return false;
     }
     planes.extend_from_slice(&occluder.cuts);
-    planes.extend(occluder.edges.iter().map(|Line { ends: [p, q], .. }| {
+    planes.extend(occluder.edges.iter().filter_map(|Line { ends: [p, q], .. }| {
         let normal = (*q - x).cross(*p - x);
-        (normal, normal.dot(x))
+        // Seen end-on, an edge is a point, and those beside it make the outline.
+        let is_seen = normal.length_squared() > touch * touch * p.distance_squared(*q);
+        is_seen.then(|| (normal, normal.dot(x)))
     }));
     true
 }
@@ -168,7 +170,7 @@ fn hidden(
     (shadows, planes): (&[(u16, Range<usize>)], &[Plane]),
     clips: &mut [Clip],
 ) -> f64 {
-    let Some((clip, clips)) = clips.split_first_mut() else { return 0.0 };
+    let [clip, clips @ ..] = clips else { unreachable!("there is a clip for each shadow of a few") };
     let mut sum = 0.0;
     for (k, (_, range)) in shadows.iter().enumerate() {
         match within(target, &planes[range.clone()], clip) {
@@ -194,7 +196,7 @@ enum Within {
 /// How much of a polygon lies within a shadow; a part is left in `clip`.
 fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
     // Planes that cut and corners that lie outside, as bits.
-    let (mut cuts, mut outside) = (0u64, 0u64);
+    let (mut cuts, mut outside, mut first) = (0u64, 0u64, None);
     clip.heights.clear();
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
@@ -209,7 +211,8 @@ fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
             return Within::None;
         }
         if low < -reach {
-            if cuts == 0 {
+            if first.is_none() {
+                first = Some(k);
                 keep(polygon, &clip.heights[start..], reach, &mut clip.part);
             }
             cuts |= 1 << k.min(63);
@@ -218,12 +221,9 @@ fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
             }
         }
     }
-    if cuts == 0 {
-        return Within::All;
-    }
-    let rest = cuts & (cuts - 1);
-    for (k, &(normal, offset)) in shadow.iter().enumerate() {
-        if rest >> k.min(63) & 1 == 1 && !clip.keep_above(normal, offset) {
+    let Some(first) = first else { return Within::All };
+    for (k, &(normal, offset)) in shadow.iter().enumerate().skip(first + 1) {
+        if cuts >> k.min(63) & 1 == 1 && !clip.keep_above(normal, offset) {
             return Within::None;
         }
     }
