@@ -134,7 +134,8 @@ impl Monitor for Frames<'_> {
 
     fn solved(&self, solution: &Solution) {
         let mut state = self.lock();
-        if state.failure.is_some() {
+        // The answer begins anew without rays: its first picture is older than those that are there.
+        if state.failure.is_some() || (state.count > 0 && solution.rays() == 0) {
             return;
         }
         match self.write(solution, state.count) {

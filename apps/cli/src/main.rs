@@ -187,6 +187,7 @@ impl From<radiosity::Error> for Failure {
             | radiosity::Error::Matrix { .. }
             | radiosity::Error::Element(_)
             | radiosity::Error::Tolerance { .. }
+            | radiosity::Error::Transmission { .. }
             | radiosity::Error::Lightmap(_) => Failure::input(error),
             other => Failure::work(other),
         }

@@ -58,12 +58,21 @@ pub fn explain_black(picture: &Picture, scene: &Scene, progress: &Progress) {
     }
 }
 
+/// ΔE of white from black: a bound above it says nothing.
+const WHITE: f64 = 100.0;
+
+/// What is asked for at one exposure is a little more or less at another that is as good.
+const ROUNDED: f64 = 1.05;
+
 /// How near to the solution of its equation what is displayed is known to be, and whether that is as asked: the exposure of
 /// a picture is known after the solve.
 pub fn nearness(shown: &Shown, asked: f64) -> String {
     let (delta_e, exposure) = (numbers::rough(shown.delta_e), numbers::fixed(shown.exposure, 2));
-    match shown.delta_e <= asked {
-        true => format!("what is displayed is within ΔE {delta_e} of the solution of its equation"),
+    if shown.delta_e <= ROUNDED * asked {
+        return format!("what is displayed is within ΔE {delta_e} of the solution of its equation");
+    }
+    match shown.delta_e > WHITE {
+        true => "warning: the solver ended too early to know how near what is displayed is to the solution".to_owned(),
         false => format!(
             "warning: at the exposure of this picture, {exposure} EV, what is displayed is known to be within ΔE {delta_e} \
              of the solution, not {asked}; --exposure {exposure} has it solved for this picture"
