@@ -21,6 +21,26 @@ impl Entry {
     }
 }
 
+/// Entries by a key below n, and where those of each key end. By counting: entries of one key keep their order, so that
+/// sums of several parts are always the same.
+fn sorted(chunks: &[Vec<Entry>], n: usize, key: impl Fn(&Entry) -> u32) -> (Vec<Entry>, Vec<usize>) {
+    let mut next = vec![0usize; n + 1];
+    for entry in chunks.iter().flatten() {
+        next[key(entry) as usize + 1] += 1;
+    }
+    for i in 0..n {
+        next[i + 1] += next[i];
+    }
+    let mut sorted = vec![Entry { pair: [0; 2], value: 0.0, error: 0.0 }; next[n]];
+    for entry in chunks.iter().flatten() {
+        let slot = &mut next[key(entry) as usize];
+        sorted[*slot] = *entry;
+        *slot += 1;
+    }
+    next.truncate(n);
+    (sorted, next)
+}
+
 /// View factors between N facets (or surfaces), symmetric by storage: of A_i F_ij = A_j F_ji only i ≤ j is kept, by
 /// rows.
 #[derive(Clone, Debug, Default)]
@@ -39,29 +59,14 @@ impl ViewFactors {
     pub(crate) fn new(areas: Vec<f64>, entries: impl Iterator<Item = Vec<Entry>>, choices: Choices) -> ViewFactors {
         let n = areas.len();
         let chunks: Vec<Vec<Entry>> = entries.collect();
-        // By counting: rows first, then each row by column.
-        let mut counts = vec![0usize; n + 1];
-        for entry in chunks.iter().flatten() {
-            counts[entry.pair[0] as usize + 1] += 1;
-        }
-        for i in 0..n {
-            counts[i + 1] += counts[i];
-        }
-        let mut next = counts.clone();
-        let mut sorted = vec![(0u32, 0f64, 0f32); counts[n]];
-        for entry in chunks.iter().flatten() {
-            let slot = &mut next[entry.pair[0] as usize];
-            sorted[*slot] = (entry.pair[1], entry.value, entry.error);
-            *slot += 1;
-        }
+        let (by_column, _) = sorted(&chunks, n, |entry| entry.pair[1]);
         drop(chunks);
+        let (entries, ends) = sorted(&[by_column], n, |entry| entry.pair[0]);
         let mut of = ViewFactors { areas, starts: vec![0], choices, ..ViewFactors::default() };
-        for i in 0..n {
-            let row = &mut sorted[counts[i]..counts[i + 1]];
-            // Stable, so that sums of several parts have one order.
-            row.sort_by_key(|entry| entry.0);
-            for &(column, value, error) in &*row {
-                let first = of.starts[i];
+        let mut start = 0;
+        for end in ends {
+            let first = of.columns.len();
+            for &Entry { pair: [_, column], value, error } in &entries[start..end] {
                 if of.columns.len() > first && of.columns.last() == Some(&column) {
                     let last = of.values.len() - 1;
                     of.values[last] += value;
@@ -72,6 +77,7 @@ impl ViewFactors {
                     of.errors.push(error);
                 }
             }
+            start = end;
             of.starts.push(of.columns.len());
         }
         of
