@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let camera = needs_camera.then(|| views::camera(&input.scene, &tracer, &arguments.picture)).transpose()?;
 
     progress.parts();
-    arguments.solve.warn_of_loose_solver(progress);
+    arguments.solve.warn_of_methods(progress);
     progress.limit(arguments.solve.time);
     let frames = Frames::begin(&arguments.picture, (&tracer, camera.as_ref()), &arguments.solve.options(), progress)?;
     let monitor: &dyn Monitor = frames.as_ref().map_or(progress, |frames| frames);

@@ -56,7 +56,11 @@ fn summary(input: &Input) -> String {
         ));
     }
     let emitting = scene.materials.iter().filter(|m| m.emits()).count();
-    lines.push(format!("  {}, {emitting} of them luminous", count(scene.materials.len(), "material")));
+    let transmitting = match scene.materials.iter().filter(|m| m.transmits()).count() {
+        0 => String::new(),
+        sheets => format!(", {sheets} letting light through"),
+    };
+    lines.push(format!("  {}, {emitting} of them luminous{transmitting}", count(scene.materials.len(), "material")));
     let (lights, cameras) = (count(scene.lights.len(), "light"), count(scene.cameras.len(), "camera"));
     lines.push(format!("  {lights} without area, {cameras}"));
     lines.extend(input.faults.0.iter().map(ToString::to_string));

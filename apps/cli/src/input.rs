@@ -112,8 +112,14 @@ impl SolveArguments {
         }
     }
 
-    /// Tells of what is asked less exactly than is usual.
-    pub fn warn_of_loose_solver(&self, progress: &Progress) {
+    /// Tells of methods that do less than the usual ones.
+    pub fn warn_of_methods(&self, progress: &Progress) {
+        if let Some(method) = self.form_factors.0.filter(|method| !method.sees_occlusion()) {
+            progress.say(&format!(
+                "warning: {method} does not see what stands between surfaces; where anything does, light that is reflected \
+                 passes through it, and no rays or elements mend that (--ff adaptive sees it)"
+            ));
+        }
         let (own, usual) = (self.options().params.tolerance, radiosity::SolveOptions::default().params.tolerance);
         if own > usual && self.delta_e.is_none() {
             progress.say(&format!(

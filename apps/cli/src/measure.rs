@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let tracer = Tracer::new(&input.scene, &input.mesh);
     let places: Vec<_> = points.iter().map(|p| (p.position, p.normal)).collect();
     progress.parts();
-    arguments.solve.warn_of_loose_solver(progress);
+    arguments.solve.warn_of_methods(progress);
     progress.limit(arguments.solve.time);
     let measured = radiosity::measure(&tracer, &places, &arguments.solve.measure(), progress)?;
 

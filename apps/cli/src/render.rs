@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     arguments.picture.warn_of_what_has_no_effect(true, !views::is_exr(&arguments.output), progress);
     let camera = views::camera(&input.scene, &tracer, &arguments.picture)?;
     progress.parts();
-    arguments.solve.warn_of_loose_solver(progress);
+    arguments.solve.warn_of_methods(progress);
     progress.limit(arguments.solve.time);
     let frames = Frames::begin(&arguments.picture, (&tracer, Some(&camera)), &arguments.solve.options(), progress)?;
     let monitor: &dyn Monitor = frames.as_ref().map_or(progress, |frames| frames);

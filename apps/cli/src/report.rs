@@ -153,8 +153,13 @@ impl ErrorReport {
                 "error asked {asked}: NOT reached; the audit finds no light at all, but the answer has some"
             );
         }
-        let mut line =
-            format!("error asked {}: {verdict}; audit says {}, {bound}", percent(self.asked), percent(self.estimated));
+        let says = match self.estimated {
+            estimated if percent(estimated) == percent(0.0) && self.upper_95_one_sided > 0.0 => {
+                "less than it can tell".to_owned()
+            }
+            estimated => percent(estimated),
+        };
+        let mut line = format!("error asked {}: {verdict}; audit says {says}, {bound}", percent(self.asked));
         if self.is_lost_in_writing() {
             let within = percent(self.solution_upper_95_one_sided);
             line += &format!("; the solution itself is within {within}");
