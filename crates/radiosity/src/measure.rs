@@ -31,12 +31,22 @@ pub struct MeasureOptions {
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 1000, rounds: 5, seed: 1 }
+        MeasureOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 400, rounds: 5, seed: 1 }
     }
 }
 
-/// Cells to aim for where they are looked up by a gather at each point.
-const LOOKED_UP_CELLS: usize = 50_000;
+/// Cells that a gather at each point looks up, at most, and how many at an error of 1 %: what each has wrong averages out
+/// over its rays.
+const LOOKED_UP_CELLS: [f64; 2] = [50_000.0, 10_000.0];
+
+/// Variation of direct light within an element that is looked up, by the error asked.
+const VARIATION: f64 = 5.0;
+
+/// Part of the error asked that a round aims at: its bound has to meet that, too.
+const AIM: f64 = 0.6;
+
+/// Most that the rays grow by from one round to the next.
+const MOST_GROWTH: f64 = 8.0;
 
 /// Fewest pairs of estimates that an audit judges by.
 const LEAST_WATCHED: usize = 64;
@@ -137,16 +147,17 @@ pub fn measure(
     let stages = Stages::default();
     let places: Vec<Place> = points.iter().map(|(p, n)| stations::snap(tracer, *p, *n)).collect();
     let mut solve = options.solve;
-    // The elements are only looked up, and the noise of many averages out: few rays each, and small ones.
+    // The elements are only looked up, and the noise of many averages out: few rays each.
     solve.rays = solve.rays.max(rays_for(options.error, 32.0, 16, 1024));
-    solve.cells = solve.cells.max(LOOKED_UP_CELLS);
-    solve.variation = solve.variation.min(options.error);
+    let [most, at_one_percent] = LOOKED_UP_CELLS;
+    solve.cells = solve.cells.max((at_one_percent * 0.01 / options.error).min(most) as usize);
+    solve.variation = solve.variation.min(VARIATION * options.error);
     solve.suit_method();
     solve.fit(tracer);
-    let wanted = rays_for(options.error, 4096.0, FEWEST_GATHERED, 16384);
+    let wanted = rays_for(options.error, 512.0, FEWEST_GATHERED, 16384);
     // Within a time limit one comes to them step by step.
     let mut gather = if monitor.deadline().is_some() { FEWEST_GATHERED } else { wanted };
-    let shadow_rays = rays_for(options.error, 1024.0, 64, 8192);
+    let shadow_rays = rays_for(options.error, 256.0, 32, 8192);
     let mut shadowing = Shadowing { places: 1, rays: (shadow_rays * gather / wanted).max(16) as u32 };
     monitor.round(1, options.rounds + 1);
     let mut solution = Solution::new(tracer, &solve, monitor)?;
@@ -185,7 +196,9 @@ pub fn measure(
         let next = SolveOptions { element_size: size, rays: 2 * solution.rays(), ..solve };
         let fits = Solution::fits(tracer, &next);
         let is_last = achieved || rounds.len() > options.rounds || places.is_empty() || !fits || is_stalled(&rounds);
-        let out_of_time = !is_last && !has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64());
+        let growth = growth(audit.error / options.error);
+        let takes = 0.5 * growth as f64 * ROUND_GROWTH * begun.elapsed().as_secs_f64();
+        let out_of_time = !is_last && !has_time(monitor, takes);
         if is_last || out_of_time {
             stages.absorb(&solution.stages);
             return Ok(Measurement {
@@ -200,8 +213,8 @@ pub fn measure(
             });
         }
         monitor.round(rounds.len() + 1, options.rounds + 1);
-        gather *= 2;
-        shadowing.rays *= 2;
+        gather *= growth;
+        shadowing.rays *= growth as u32;
         if smaller.is_some() {
             stages.absorb(&solution.stages);
             drop(solution);
@@ -210,6 +223,13 @@ pub fn measure(
             solution.refine(next.rays, monitor)?;
         }
     }
+}
+
+/// Times as many rays for the next round after one that ended at an error, relative to that asked: a power of two.
+fn growth(error: f64) -> usize {
+    // Error ∝ M^−0.7, as that of stratified samples is.
+    let wanted = (error / AIM).powf(1.0 / 0.7).clamp(2.0, MOST_GROWTH);
+    (wanted as usize).next_power_of_two()
 }
 
 /// Two rounds that leave more than this part of the error before them are the last: what remains is not noise. One
