@@ -31,6 +31,7 @@ pub mod measure;
 mod monitor;
 mod preview;
 pub mod render;
+pub mod session;
 mod solution;
 pub mod stations;
 mod vertex_light;

@@ -1,0 +1,145 @@
+//! What may be changed in a scene that is being watched, and why a change is refused.
+
+use crate::session::{LightId, ObjectId};
+use radiosity_scene::Bands;
+use serde::{Deserialize, Serialize};
+
+/// Most by which a light may be turned up.
+pub const MOST_DIMMING: f32 = 100.0;
+
+/// A change of the scene. Matrices are by columns and carry the object as the file places it, in world coordinates, to
+/// where it shall be: the identity is its place in the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Edit {
+    /// Turns a light up or down, or puts a coloured filter before it. Traces no ray.
+    Light {
+        /// The light.
+        light: LightId,
+        /// 0 is off, 1 is as in the file; up to [`MOST_DIMMING`].
+        dimming: f32,
+        /// By what its light is multiplied in each band, 0 to 1 where it is a filter; `[1, 1, 1]` is as in the file.
+        colour: Bands,
+    },
+    /// Paints an object. Traces no ray. A picture on it keeps its pattern and gets this mean.
+    Reflectance {
+        /// The object.
+        object: ObjectId,
+        /// Diffuse reflectance per band, 0 to 0.99.
+        reflectance: Bands,
+    },
+    /// Places an object anew; a lamp takes its light along.
+    Move {
+        /// The object.
+        object: ObjectId,
+        /// From its place in the file to the new one.
+        matrix: [f64; 16],
+    },
+    /// Places a light without area anew.
+    MoveLight {
+        /// The light: point, spot or directional.
+        light: LightId,
+        /// From its place in the file to the new one.
+        matrix: [f64; 16],
+    },
+    /// Adds a copy of an object, which gets the next free id ([`Applied::added`]).
+    Copy {
+        /// The object that is copied, as it is now.
+        object: ObjectId,
+        /// From the place in the file to that of the copy.
+        matrix: [f64; 16],
+    },
+    /// Takes an object away, with its light. It keeps its id.
+    Delete {
+        /// The object.
+        object: ObjectId,
+    },
+    /// Brings an object back that was taken away.
+    Restore {
+        /// The object.
+        object: ObjectId,
+    },
+    /// Several edits, one after the other; all or none of them.
+    Several(Vec<Edit>),
+}
+
+/// What an edit did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Applied {
+    /// The edit that takes it back, to the last bit.
+    pub inverse: Edit,
+    /// Objects that were added.
+    pub added: Vec<ObjectId>,
+    /// Lights that were added.
+    pub added_lights: Vec<LightId>,
+    /// Objects whose place, paint or being there has changed.
+    pub objects: Vec<ObjectId>,
+    /// Whether rays have to be traced again.
+    pub traces: bool,
+}
+
+/// Why an edit was refused. Nothing has changed then.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EditError {
+    /// There is no such object.
+    #[error("there is no object {}", .0.0)]
+    UnknownObject(ObjectId),
+    /// There is no such light.
+    #[error("there is no light {}", .0.0)]
+    UnknownLight(LightId),
+    /// The object was taken away before.
+    #[error("object {} has been deleted (restore it first)", .0.0)]
+    Deleted(ObjectId),
+    /// The object is there.
+    #[error("object {} has not been deleted", .0.0)]
+    NotDeleted(ObjectId),
+    /// A dimming or a colour that is no light.
+    #[error("light {}: dimming {dimming} and colour {colour:?}; both are finite, 0 or more and at most 100", light.0)]
+    Light {
+        /// The light.
+        light: LightId,
+        /// What was asked for.
+        dimming: f32,
+        /// What was asked for.
+        colour: Bands,
+    },
+    /// A reflectance that no surface has.
+    #[error("object {}: reflectance {reflectance:?} is not within 0 and 0.99", object.0)]
+    Reflectance {
+        /// The object.
+        object: ObjectId,
+        /// What was asked for.
+        reflectance: Bands,
+    },
+    /// A matrix with a number that is not finite.
+    #[error("the matrix has a number that is not finite")]
+    NotFinite,
+    /// A matrix that is no placement.
+    #[error("the matrix is no placement: its last row is {0:?}, not [0, 0, 0, 1]")]
+    NotAffine([f64; 4]),
+    /// A matrix that mirrors, flattens, or scales by more than a thousand.
+    #[error("the matrix has the determinant {0}: it mirrors the object, or makes it too small or too large")]
+    Determinant(f64),
+    /// The object would be too far away for single precision.
+    #[error("object {} would be {distance:.1} m from the middle of the scene; at most {most:.1} m", object.0)]
+    TooFar {
+        /// The object.
+        object: ObjectId,
+        /// Where it would reach.
+        distance: f64,
+        /// How far objects may reach.
+        most: f64,
+    },
+    /// The light has no place of its own.
+    #[error("light {} cannot be placed by itself: it is the sky, or an object that shines (move that)", .0.0)]
+    NotPlaceable(LightId),
+    /// The memory that was allowed does not hold another object.
+    #[error("another object would need {} in all; {} allowed", radiosity_scene::size(*needed), radiosity_scene::size(*allowed))]
+    Memory {
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes allowed.
+        allowed: usize,
+    },
+}
