@@ -291,9 +291,14 @@ pub fn triangle_from_square(x: f64, y: f64) -> (f64, f64) {
 /// Cells along an edge: the geometric mean of the longest edge and √(2 area) over the size, so that squares come
 /// out as asked and slivers do not explode; the next power of two, because powers of two nest along shared edges.
 fn division(mesh: &Mesh, triangle: usize, size: f64) -> u32 {
-    let [a, b, c] = mesh.corners(triangle);
+    division_of(mesh.corners(triangle), size)
+}
+
+/// Cells along an edge of a triangle that is cut into cells about `size` wide: a power of two.
+pub fn division_of([a, b, c]: [DVec3; 3], size: f64) -> u32 {
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-    let width = (longest * (2.0 * mesh.area(triangle)).sqrt()).sqrt();
+    let area = 0.5 * (b - a).cross(c - a).length();
+    let width = (longest * (2.0 * area).sqrt()).sqrt();
     // Rounding at √2 keeps the mean size as asked.
     let wanted = (width / size / std::f64::consts::SQRT_2).ceil().clamp(1.0, f64::from(MAX_DIVISION));
     (wanted as u32).next_power_of_two()
@@ -302,7 +307,7 @@ fn division(mesh: &Mesh, triangle: usize, size: f64) -> u32 {
 /// The piece at barycentric (u, v) of k × k, and the coordinates within it. Row j (0-based, by v) holds 2(k−j)−1
 /// pieces: upright and inverted in turn.
 #[inline]
-fn locate(u: f32, v: f32, k: u32) -> (u32, f32, f32) {
+pub fn locate(u: f32, v: f32, k: u32) -> (u32, f32, f32) {
     if k == 1 {
         return (0, u, v);
     }
@@ -316,7 +321,7 @@ fn locate(u: f32, v: f32, k: u32) -> (u32, f32, f32) {
 }
 
 /// Barycentric corners of a piece of k × k, in the order that [`locate`]'s coordinates within it refer to.
-fn corners(piece: u32, k: u32) -> [DVec2; 3] {
+pub fn corners(piece: u32, k: u32) -> [DVec2; 3] {
     // Rows before row r hold r (2k − r) = k² − (k − r)² pieces.
     let row = k - f64::from(k * k - piece).sqrt().ceil() as u32;
     let within = piece - row * (2 * k - row);

@@ -42,6 +42,11 @@ pub(crate) fn bounds_of(triangles: &[[Vec3; 3]]) -> Option<[Vec3; 2]> {
         .fold(None, |bounds, &p| Some(bounds.map_or([p, p], |[lo, hi]: [Vec3; 2]| [lo.min(p), hi.max(p)])))
 }
 
+/// By how much backs are set back in a scene with these bounds.
+pub(crate) fn tie_of([lo, hi]: [Vec3; 2]) -> f32 {
+    TIE * lo.abs().max(hi.abs()).max_element()
+}
+
 /// A ray made ready for triangles and boxes.
 pub(crate) struct Prepared {
     pub origin: [f32; 3],
@@ -67,6 +72,12 @@ impl Prepared {
     /// `None` where the ray cannot hit anything inside `bounds`.
     #[inline]
     pub fn new(ray: &Ray, bounds: [Vec3; 2]) -> Option<Prepared> {
+        Prepared::with_tie(ray, bounds, tie_of(bounds))
+    }
+
+    /// The same where backs are set back by `tie`.
+    #[inline]
+    pub fn with_tie(ray: &Ray, bounds: [Vec3; 2], tie: f32) -> Option<Prepared> {
         let [lo, hi] = bounds;
         let reach = (ray.origin - lo).abs().max((ray.origin - hi).abs()).max_element();
         let d = ray.direction.to_array();
@@ -100,7 +111,7 @@ impl Prepared {
             axes: [x, y, z],
             shear: [d[x] * inverse[z], d[y] * inverse[z]],
             scale: inverse[z],
-            tie: TIE * lo.abs().max(hi.abs()).max_element(),
+            tie,
             inverse,
             pad: inverse.map(|i| pad * i.abs()),
             near: std::array::from_fn(|axis| if d[axis].is_sign_negative() { axis + 3 } else { axis }),

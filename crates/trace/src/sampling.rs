@@ -76,6 +76,28 @@ impl Sequence {
         };
         std::array::from_fn(|d| unit(owen(raw[d], self.seeds[d])))
     }
+
+    /// Where scrambling carries the `2^bits` equal intervals of [0, 1) in the first two dimensions (nested scrambling
+    /// permutes them): points that are not scrambled, those of [`strata`], lie in interval k where those of this sequence
+    /// lie in interval `[d][k]`. At most 5 bits.
+    pub fn intervals(&self, bits: u32) -> [[u8; 32]; 2] {
+        std::array::from_fn(|d| {
+            let mut to = [0; 32];
+            for (k, to) in to.iter_mut().enumerate().take(1 << bits) {
+                // None of the bits below has a say in the upper ones.
+                let x = if bits == 0 { 0 } else { (k as u32) << (32 - bits) };
+                *to = if bits == 0 { 0 } else { (owen(x, self.seeds[d]) >> (32 - bits)) as u8 };
+            }
+            to
+        })
+    }
+}
+
+/// The intervals of length `2^-bits` that point `index` of the sequence without scrambling lies in, in the first two
+/// dimensions.
+pub fn strata(index: u32, bits: u32) -> [u8; 2] {
+    let raw = sobol(index);
+    std::array::from_fn(|d| if bits == 0 { 0 } else { (raw[d] >> (32 - bits)) as u8 })
 }
 
 /// Nested uniform scrambling of the bits of `x`.
@@ -213,6 +235,23 @@ mod tests {
                     cells.sort_unstable();
                     cells.dedup();
                     assert_eq!(cells.len(), n as usize, "{nx} x {ny} of seed {seed}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scrambling_permutes_intervals() {
+        for seed in 0..50 {
+            let sequence = Sequence::new(seed, 7);
+            for bits in 0..6 {
+                let to = sequence.intervals(bits);
+                for index in 0..300 {
+                    let (point, from) = (sequence.point(index), strata(index, bits));
+                    for d in 0..2 {
+                        let interval = (point[d] * (1 << bits) as f32) as u8;
+                        assert_eq!(to[d][usize::from(from[d])], interval, "{seed} {bits} {index}");
+                    }
                 }
             }
         }

@@ -8,7 +8,7 @@
 
 use crate::build::{Item, build};
 use crate::collapse::collapse;
-use crate::intersect::{Prepared, bounds_of};
+use crate::intersect::{Prepared, bounds_of, tie_of};
 use crate::{Hit, Ray, portable};
 use glam::Vec3;
 
@@ -120,6 +120,8 @@ pub struct Tree {
     pub(crate) nodes: Vec<Node>,
     pub(crate) blocks: Vec<Block>,
     pub(crate) bounds: Option<[Vec3; 2]>,
+    /// What backs are set back by.
+    tie: f32,
     len: usize,
     /// Whether the processor has what `avx2` is compiled for. Set nowhere but in [`Tree::new`] and to false in tests.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
@@ -156,7 +158,21 @@ impl Tree {
             .collect();
         let binary = build(&mut items);
         let (nodes, blocks) = collapse(&binary, &items, triangles);
-        Tree { nodes, blocks, bounds: bounds_of(triangles), len: triangles.len(), simd: has_simd() }
+        let bounds = bounds_of(triangles);
+        let tie = bounds.map_or(0.0, tie_of);
+        Tree { nodes, blocks, bounds, tie, len: triangles.len(), simd: has_simd() }
+    }
+
+    /// The same tree for a part of a scene whose coordinates are at most `reach`: its hits compete with those of the tree of
+    /// another part as if both were one ([`Tree::key`]).
+    pub fn as_part(mut self, reach: f32) -> Tree {
+        self.tie = tie_of([Vec3::splat(reach); 2]);
+        self
+    }
+
+    /// The distance by which a hit competes with others: the smaller one counts, of equal ones that of the lower index.
+    pub fn key(&self, hit: &Hit) -> f32 {
+        hit.key(self.tie)
     }
 
     /// Number of triangles given.
@@ -188,7 +204,7 @@ impl Tree {
     /// through the others. `accept` may be asked about hits behind the nearest one, and in any order.
     #[inline]
     pub fn closest_where(&self, ray: &Ray, mut accept: impl FnMut(u32, f32, f32, bool) -> bool) -> Option<Hit> {
-        let prepared = Prepared::new(ray, self.bounds?)?;
+        let prepared = Prepared::with_tie(ray, self.bounds?, self.tie)?;
         #[cfg(target_arch = "x86_64")]
         if self.simd {
             // SAFETY: `simd` is set only where the processor has AVX2 and FMA.
@@ -205,7 +221,9 @@ impl Tree {
     /// Whether anything is hit that `accept` (triangle, weights of its corners 1 and 2, back) does not refuse.
     #[inline]
     pub fn blocked_where(&self, ray: &Ray, mut accept: impl FnMut(u32, f32, f32, bool) -> bool) -> bool {
-        let Some(prepared) = self.bounds.and_then(|bounds| Prepared::new(ray, bounds)) else { return false };
+        let Some(prepared) = self.bounds.and_then(|bounds| Prepared::with_tie(ray, bounds, self.tie)) else {
+            return false;
+        };
         #[cfg(target_arch = "x86_64")]
         if self.simd {
             // SAFETY: `simd` is set only where the processor has AVX2 and FMA.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
 /// nothing extra: its noise there is no more than that of ordinary reflected light.
-const BRIGHT: f64 = 2.0;
+pub const BRIGHT: f64 = 2.0;
 
 /// One emitting triangle.
 #[derive(Clone, Debug)]

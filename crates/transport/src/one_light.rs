@@ -188,7 +188,7 @@ fn geometry(from: &Place, to: &Place) -> f64 {
 }
 
 /// A point of a piece and its weight: the form-factor density over the sampling density.
-fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
+pub fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
     let [a, b, c] = piece.corners;
     let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
     // Far away the solid angle is too small for its own arithmetic, and area sampling is as good.

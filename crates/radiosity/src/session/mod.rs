@@ -32,16 +32,32 @@
 //! Objects are not sewn together as [`Mesh`](radiosity_scene::Mesh) does it for batch work, since they move: light is
 //! smooth within an object and may jump between two that touch.
 
+mod display;
 mod edit;
+mod edited;
+mod light;
 mod model;
+mod paint;
+mod probe;
+mod solve;
+mod state;
 
 pub use edit::{Applied, Edit, EditError, MOST_DIMMING};
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 
 use crate::Error;
+use display::Display;
+use edited::Done;
+use light::{Light, MOST_COLUMNS, Strand};
+use paint::Paint;
 use radiosity_scene::{Bands, Scene};
+use radiosity_transport::live::{Lanes, Live, Target};
 use serde::Serialize;
-use std::time::Duration;
+use solve::Answer;
+use state::State;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::{Duration, Instant};
 
 /// How a session works.
 #[derive(Clone, Copy, Debug)]
@@ -102,8 +118,36 @@ pub struct Status {
 
 /// A scene that is lit while it is looked at and changed while it is lit.
 pub struct Session {
-    scene: Scene,
+    scene: Arc<Scene>,
+    live: Live,
+    objects: Vec<Placed>,
+    lights: Vec<Light>,
+    strands: Vec<Strand>,
+    answer: Answer,
+    state: State,
+    memory: usize,
+    /// The layer that was asked for last, by id.
+    cache: Mutex<Option<(Layer, u64, Arc<Vec<Lanes<4>>>)>>,
 }
+
+/// An object as it is now.
+#[derive(Clone)]
+struct Placed {
+    /// Of the scene.
+    source: usize,
+    paint: Arc<Paint>,
+    display: Arc<OnceLock<Display>>,
+    coat: Option<Bands>,
+    matrix: [f64; 16],
+    light: Option<usize>,
+    group: u32,
+}
+
+/// Least shadow rays from an element to a light that are shared out.
+const LEAST_SHADOWS: u32 = 8;
+
+/// Most shadow rays: as many as there are bits to keep them.
+const MOST_SHADOWS: u32 = 64;
 
 impl Session {
     /// Makes a scene ready. It is dark; no ray has been traced.
@@ -111,8 +155,79 @@ impl Session {
     /// # Errors
     /// [`Error::Empty`]; [`Error::Memory`] before anything large is allocated.
     pub fn new(scene: Scene, options: &SessionOptions) -> Result<Session, Error> {
-        let _ = options;
-        Ok(Session { scene })
+        if scene.triangles.is_empty() {
+            return Err(Error::Empty("the scene has no surface"));
+        }
+        let size = element_size(&scene, options);
+        let rays = options.rays.clamp(4, 1024).next_power_of_two();
+        let elements = Live::count(&scene, size);
+        let shining = scene.objects.iter().filter(|object| scene.materials[object.material].emits()).count();
+        let lights = shining + scene.lights.len() + usize::from(!scene.sky.is_black());
+        let shared = (MOST_SHADOWS as usize / lights.max(1)).max(1).next_power_of_two() as u32;
+        let shadows = options.shadow_rays.unwrap_or(shared.max(LEAST_SHADOWS));
+        let most = Target { rays, shadows: shadows.max(1).next_power_of_two().min(MOST_SHADOWS) };
+        let (needed, allowed) = (bytes(elements, rays, lights.min(MOST_COLUMNS)), options.memory);
+        if needed > allowed {
+            return Err(Error::Memory { elements, rays: rays as usize, needed, allowed });
+        }
+
+        let scene = Arc::new(scene);
+        let live = Live::new(scene.clone(), size, most);
+        let lights = light::lights_of(&scene, &live);
+        let mut session = Session {
+            objects: placed(&scene, &live),
+            scene,
+            live,
+            lights: Vec::new(),
+            strands: Vec::new(),
+            answer: Answer::default(),
+            state: State::dark(),
+            memory: options.memory,
+            cache: Mutex::new(None),
+        };
+        lights.into_iter().for_each(|light| session.add_light(light));
+        session.refresh_answer();
+        Ok(session)
+    }
+
+    fn add_light(&mut self, mut light: Light) {
+        let index = self.lights.len();
+        if let Some(body) = light.body {
+            self.objects[body].light = Some(index);
+        }
+        let is_direct = light.is_direct;
+        light.strand = light::strand_of(&mut self.strands, index);
+        let strand = light.strand;
+        self.lights.push(light);
+        if is_direct {
+            if self.strands[strand].column.is_none() {
+                self.strands[strand].column = Some(self.live.add_column(strand as u32, &[]));
+            }
+            self.place_lamps(strand);
+        }
+    }
+
+    /// Reflectances and areas of all ids.
+    fn refresh_answer(&mut self) {
+        let ids = self.live.ids();
+        self.answer.rho = vec![[0.0; 3]; ids];
+        self.answer.area = vec![0.0; ids];
+        self.answer.passed.clear();
+        for (body, placed) in self.live.world().bodies.iter().zip(&self.objects) {
+            if !body.is_present {
+                continue;
+            }
+            for element in 0..body.len() {
+                let id = body.first + element;
+                let (rho, tau) = placed.paint.of(element, body.shape.fronts, placed.coat);
+                self.answer.rho[id as usize] = rho;
+                self.answer.area[id as usize] = body.area(element) as f32;
+                if let Some(other) = body.shape.opposite(element).filter(|_| placed.paint.transmits) {
+                    self.answer.passed.push((id, body.first + other, tau));
+                }
+            }
+        }
+        self.answer.measure();
     }
 
     /// The scene as it was handed in: pictures, materials, the triangles that numbers refer to.
@@ -120,73 +235,125 @@ impl Session {
         &self.scene
     }
 
-    /// The scene as it is edited now, to be written to a file.
-    pub fn edited_scene(&self) -> Scene {
-        self.scene.clone()
-    }
-
-    /// What to draw.
-    pub fn model(&self) -> Model {
-        Model {
-            name: self.scene.name.clone(),
-            objects: Vec::new(),
-            lights: Vec::new(),
-            cameras: Vec::new(),
-            bounds: [[0.0; 3]; 2],
-            up: self.scene.up.direction().to_array(),
-        }
-    }
-
     /// Changes the scene. The light follows in the next steps.
     ///
     /// # Errors
     /// [`EditError`]; nothing has changed then.
     pub fn apply(&mut self, edit: &Edit) -> Result<Applied, EditError> {
-        Err(match edit {
-            Edit::Light { light, .. } | Edit::MoveLight { light, .. } => EditError::UnknownLight(*light),
-            _ => EditError::UnknownObject(ObjectId(0)),
+        self.check(edit)?;
+        let mut done = Done::default();
+        let inverse = self.carry_out(edit, &mut done);
+        if done.repaints || done.traces {
+            self.refresh_answer();
+        }
+        for strand in &done.strands {
+            self.place_lamps(*strand);
+        }
+        for strand in &done.dimmed {
+            if let Some(column) = self.strands[*strand].column {
+                let (_, strength) = light::lamps(&self.strands[*strand], &self.lights);
+                self.live.set_strength(column, &strength);
+            }
+        }
+        let keeps_columns = !(done.repaints || done.traces || !done.dimmed.is_empty());
+        self.state.edited(keeps_columns);
+        let ids = |of: &BTreeSet<usize>| of.iter().map(|index| *index as u32).collect::<Vec<_>>();
+        Ok(Applied {
+            inverse,
+            added: done.added.into_iter().map(|index| ObjectId(index as u32)).collect(),
+            added_lights: done.added_lights.into_iter().map(|index| LightId(index as u32)).collect(),
+            objects: ids(&done.objects).into_iter().map(ObjectId).collect(),
+            traces: done.traces,
         })
     }
 
     /// Works for about `budget`, at least on one small piece.
     pub fn step(&mut self, budget: Duration) -> Step {
-        let _ = budget;
-        Step { changed: Vec::new(), is_complete: true, is_done: true }
+        let started = Instant::now();
+        let deadline = started + budget;
+        while !self.is_done() {
+            self.piece(deadline);
+            if Instant::now() >= deadline {
+                break;
+            }
+        }
+        self.state.seconds += started.elapsed().as_secs_f64();
+        let changed = std::mem::take(&mut self.state.changed);
+        Step {
+            changed: changed.into_iter().map(|index| ObjectId(index as u32)).collect(),
+            is_complete: self.state.solved_rays > 0 && !self.state.is_edited,
+            is_done: self.is_done(),
+        }
     }
 
     /// Where the session stands.
     pub fn status(&self) -> Status {
+        let elements =
+            self.live.world().bodies.iter().filter(|body| body.is_present).map(|body| body.len()).sum::<u32>();
+        let most = self.live.most().rays;
         Status {
-            elements: 0,
-            rays: 0,
-            most_rays: 0,
-            error: f64::INFINITY,
-            residual: 0.0,
-            rays_traced: 0,
-            seconds: 0.0,
-            memory: 0,
-            is_done: true,
+            elements: elements as usize,
+            rays: self.state.solved_rays,
+            most_rays: most,
+            error: self.state.error,
+            residual: self.state.residual,
+            rays_traced: self.live.rays_traced(),
+            seconds: self.state.seconds,
+            memory: bytes(self.live.ids(), most, self.strands.len()),
+            is_done: self.is_done(),
         }
     }
+}
 
-    /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, or for
-    /// [`Layer::Error`] its standard error. Empty for an object that there is not.
-    pub fn light(&self, object: ObjectId, layer: Layer) -> Vec<Bands> {
-        let _ = (object, layer);
-        Vec::new()
-    }
+/// Bytes that so many elements take, with so many columns.
+fn bytes(elements: usize, rays: u32, columns: usize) -> usize {
+    // Columns of direct light, solved ones, and about twenty arrays of four numbers.
+    Live::bytes(elements, rays, columns) + elements * (columns * size_of::<Bands>() + 20 * size_of::<Lanes<4>>())
+}
 
-    /// What is known of a place on an object: `triangle` counts the object's [`ModelObject::indices`] by threes, `uv` are
-    /// the weights of its corners 1 and 2.
-    pub fn probe(&self, object: ObjectId, triangle: u32, uv: [f32; 2]) -> Option<Probe> {
-        let _ = (object, triangle, uv);
-        None
+/// Width of an element: as asked, or such that there are about as many as asked; triangles may make more.
+fn element_size(scene: &Scene, options: &SessionOptions) -> f64 {
+    if let Some(size) = options.element_size.filter(|size| *size > 0.0) {
+        return size;
     }
+    let area: f64 = (0..scene.triangles.len()).map(|triangle| scene.area(triangle)).sum();
+    let wanted = options.elements.max(1);
+    let mut size = (2.0 * area / wanted as f64).sqrt().max(f64::MIN_POSITIVE);
+    // Elements along an edge are powers of two, so that their number moves in leaps; at the size that is twelve times as
+    // wide next to all triangles are one.
+    for _ in 0..14 {
+        if Live::count(scene, size) <= wanted {
+            break;
+        }
+        size *= 1.19;
+    }
+    size
+}
 
-    /// The rays of the element that is such a triangle: origin and end, or a point as far as the scene is wide for
-    /// those that escape.
-    pub fn rays(&self, object: ObjectId, triangle: u32) -> Vec<[[f32; 3]; 2]> {
-        let _ = (object, triangle);
-        Vec::new()
+/// The objects of a scene as the file has them.
+fn placed(scene: &Scene, live: &Live) -> Vec<Placed> {
+    let mut group = 0;
+    let mut last: Option<&radiosity_scene::Object> = None;
+    let mut all = Vec::with_capacity(scene.objects.len());
+    for (source, object) in scene.objects.iter().enumerate() {
+        // Objects that were made in code have a node each; their names say what belongs together.
+        let made = |object: &radiosity_scene::Object| object.source.node == object.source.mesh;
+        let is_next = last.is_some_and(|last| {
+            let same_node = (last.source.node, last.source.instance) == (object.source.node, object.source.instance);
+            same_node || made(last) && made(object) && !object.name.is_empty() && last.name == object.name
+        });
+        group += u32::from(!is_next);
+        last = Some(object);
+        let shape = &live.world().bodies[source].shape;
+        all.push(Placed {
+            source,
+            paint: Arc::new(Paint::new(scene, source, shape)),
+            display: Arc::default(),
+            coat: None,
+            matrix: glam::DMat4::IDENTITY.to_cols_array(),
+            light: None,
+            group,
+        });
     }
+    all
 }

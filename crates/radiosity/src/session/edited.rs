@@ -1,0 +1,331 @@
+//! Edits are checked as a whole, then carried out; and the scene as they leave it.
+
+use super::edit::{Edit, EditError, MOST_DIMMING};
+use super::light::Light;
+use super::{LightId, MOST_COLUMNS, ObjectId, Session, bytes};
+use glam::{DAffine3, DMat4, DVec3};
+use radiosity_scene::material::MAX_REFLECTANCE;
+use radiosity_scene::{Scene, Sky, Source};
+use radiosity_transport::live::REACH;
+use std::collections::BTreeSet;
+
+/// How much larger or smaller than in the file an object may be made, as a factor of its volume.
+const MOST_SCALE: f64 = 1e9;
+
+/// What an edit did.
+#[derive(Default)]
+pub struct Done {
+    pub added: Vec<usize>,
+    pub added_lights: Vec<usize>,
+    pub objects: BTreeSet<usize>,
+    /// Strands whose lamps are elsewhere.
+    pub strands: BTreeSet<usize>,
+    /// Strands in whose columns lamps were dimmed.
+    pub dimmed: BTreeSet<usize>,
+    pub repaints: bool,
+    pub traces: bool,
+}
+
+/// What is there while a series of edits is checked.
+struct Known {
+    present: Vec<bool>,
+    /// Which object each is a copy of.
+    source: Vec<usize>,
+    lights: usize,
+    elements: usize,
+}
+
+impl Session {
+    /// Whether an edit can be carried out.
+    pub(super) fn check(&self, edit: &Edit) -> Result<(), EditError> {
+        let bodies = &self.live.world().bodies;
+        let mut known = Known {
+            present: bodies.iter().map(|body| body.is_present).collect(),
+            source: (0..bodies.len()).collect(),
+            lights: self.lights.len(),
+            elements: self.live.ids(),
+        };
+        self.check_one(edit, &mut known)
+    }
+
+    fn check_one(&self, edit: &Edit, known: &mut Known) -> Result<(), EditError> {
+        let there = |object: ObjectId, known: &Known| match known.present.get(object.0 as usize) {
+            None => Err(EditError::UnknownObject(object)),
+            Some(false) => Err(EditError::Deleted(object)),
+            Some(true) => Ok(known.source[object.0 as usize]),
+        };
+        match edit {
+            Edit::Light { light, dimming, colour } => {
+                if light.0 as usize >= known.lights {
+                    return Err(EditError::UnknownLight(*light));
+                }
+                if colour.iter().chain([dimming]).any(|x| !(0.0..=MOST_DIMMING).contains(x)) {
+                    return Err(EditError::Light { light: *light, dimming: *dimming, colour: *colour });
+                }
+            }
+            Edit::Reflectance { object, reflectance } => {
+                there(*object, known)?;
+                if reflectance.iter().any(|rho| !(0.0..=MAX_REFLECTANCE).contains(rho)) {
+                    return Err(EditError::Reflectance { object: *object, reflectance: *reflectance });
+                }
+            }
+            Edit::Move { object, matrix } => {
+                let source = there(*object, known)?;
+                self.check_place(*object, source, matrix)?;
+            }
+            Edit::MoveLight { light, matrix } => {
+                let own = self.lights.get(light.0 as usize).ok_or(EditError::UnknownLight(*light))?;
+                if own.point.is_none() {
+                    return Err(EditError::NotPlaceable(*light));
+                }
+                check_matrix(matrix)?;
+            }
+            Edit::Copy { object, matrix } => {
+                let source = there(*object, known)?;
+                self.check_place(*object, source, matrix)?;
+                let body = &self.live.world().bodies[source];
+                known.elements += body.len() as usize + 1;
+                known.lights += usize::from(self.objects[source].light.is_some());
+                known.present.push(true);
+                known.source.push(source);
+                let columns = known.lights.min(MOST_COLUMNS);
+                let (needed, allowed) = (bytes(known.elements, self.live.most().rays, columns), self.memory);
+                if needed > allowed {
+                    return Err(EditError::Memory { needed, allowed });
+                }
+            }
+            Edit::Delete { object } => {
+                there(*object, known)?;
+                known.present[object.0 as usize] = false;
+            }
+            Edit::Restore { object } => match known.present.get_mut(object.0 as usize) {
+                None => return Err(EditError::UnknownObject(*object)),
+                Some(true) => return Err(EditError::NotDeleted(*object)),
+                Some(present) => *present = true,
+            },
+            Edit::Several(edits) => {
+                for edit in edits {
+                    self.check_one(edit, known)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_place(&self, object: ObjectId, source: usize, matrix: &[f64; 16]) -> Result<(), EditError> {
+        let placed = check_matrix(matrix)?;
+        let world = self.live.world();
+        let most = REACH * world.half;
+        let corners = world.bodies[source].shape.corners.iter().flatten();
+        let distance =
+            corners.map(|p| (placed.transform_point3(*p) - world.middle).abs().max_element()).fold(0.0, f64::max);
+        // Written so that what is no number is refused, too.
+        if distance <= most { Ok(()) } else { Err(EditError::TooFar { object, distance, most }) }
+    }
+
+    /// Carries out an edit that was checked; answers what takes it back.
+    pub(super) fn carry_out(&mut self, edit: &Edit, done: &mut Done) -> Edit {
+        match edit {
+            Edit::Light { light, dimming, colour } => {
+                let own = &mut self.lights[light.0 as usize];
+                let inverse = Edit::Light { light: *light, dimming: own.dimming, colour: own.colour };
+                (own.dimming, own.colour) = (*dimming, *colour);
+                let strand = own.strand;
+                done.objects.extend(own.body);
+                if self.strands[strand].is_shared {
+                    done.dimmed.insert(strand);
+                }
+                inverse
+            }
+            Edit::Reflectance { object, reflectance } => {
+                let own = &mut self.objects[object.0 as usize];
+                let before = own.coat.unwrap_or(own.paint.mean);
+                own.coat = (*reflectance != own.paint.mean).then_some(*reflectance);
+                done.objects.insert(object.0 as usize);
+                done.repaints = true;
+                Edit::Reflectance { object: *object, reflectance: before }
+            }
+            Edit::Move { object, matrix } => {
+                let index = object.0 as usize;
+                let before = std::mem::replace(&mut self.objects[index].matrix, *matrix);
+                self.live.place(index, affine(matrix));
+                self.touch(index, done);
+                Edit::Move { object: *object, matrix: before }
+            }
+            Edit::MoveLight { light, matrix } => {
+                let own = &mut self.lights[light.0 as usize];
+                let before = std::mem::replace(&mut own.matrix, *matrix);
+                done.strands.insert(own.strand);
+                done.traces = true;
+                Edit::MoveLight { light: *light, matrix: before }
+            }
+            Edit::Copy { object, matrix } => {
+                let original = self.objects[object.0 as usize].clone();
+                let added = self.live.copy(object.0 as usize, affine(matrix));
+                let light = original.light.map(|light| Light { body: Some(added), ..self.lights[light].clone() });
+                let group = self.objects.iter().map(|object| object.group).max().unwrap_or(0) + 1;
+                self.objects.push(super::Placed { matrix: *matrix, light: None, group, ..original });
+                if let Some(light) = light {
+                    done.added_lights.push(self.lights.len());
+                    self.add_light(light);
+                }
+                done.added.push(added);
+                self.state.newcomers.push(added);
+                self.touch(added, done);
+                Edit::Delete { object: ObjectId(added as u32) }
+            }
+            Edit::Delete { object } => {
+                self.live.remove(object.0 as usize);
+                self.touch(object.0 as usize, done);
+                Edit::Restore { object: *object }
+            }
+            Edit::Restore { object } => {
+                let index = object.0 as usize;
+                self.live.place(index, affine(&self.objects[index].matrix));
+                self.state.newcomers.push(index);
+                self.touch(index, done);
+                Edit::Delete { object: *object }
+            }
+            Edit::Several(edits) => {
+                let mut inverse: Vec<Edit> = edits.iter().map(|edit| self.carry_out(edit, done)).collect();
+                inverse.reverse();
+                Edit::Several(inverse)
+            }
+        }
+    }
+
+    /// Notes that an object is elsewhere, with its light.
+    fn touch(&mut self, index: usize, done: &mut Done) {
+        done.objects.insert(index);
+        done.traces = true;
+        if let Some(light) = self.objects[index].light {
+            done.strands.insert(self.lights[light].strand);
+        }
+    }
+
+    /// The scene as it is edited now, to be written to a file: what was moved is where it is, what was painted has materials of
+    /// its own, and what was taken away is gone. Lights that were dimmed give as much as they do.
+    pub fn edited_scene(&self) -> Scene {
+        let from = &*self.scene;
+        let mut scene = Scene {
+            positions: Vec::new(),
+            normals: Vec::new(),
+            uvs: Default::default(),
+            colors: Vec::new(),
+            triangles: Vec::new(),
+            triangle_object: Vec::new(),
+            triangle_source: Vec::new(),
+            objects: Vec::new(),
+            lights: Vec::new(),
+            ..from.clone()
+        };
+        for (index, (placed, body)) in self.objects.iter().zip(&self.live.world().bodies).enumerate() {
+            if !body.is_present {
+                continue;
+            }
+            let object = &from.objects[placed.source];
+            let (vertices, triangles) = (object.vertices.clone(), object.triangles.clone());
+            let (first_vertex, first_triangle) = (scene.positions.len(), scene.triangles.len());
+            let turned = DMat4::from(body.matrix).inverse().transpose();
+            scene.positions.extend(from.positions[vertices.clone()].iter().map(|p| body.matrix.transform_point3(*p)));
+            scene.normals.extend(from.normals[vertices.clone()].iter().map(|n| {
+                if body.matrix == DAffine3::IDENTITY {
+                    *n
+                } else {
+                    turned.transform_vector3(n.as_dvec3()).normalize_or_zero().as_vec3()
+                }
+            }));
+            for (to, from) in scene.uvs.iter_mut().zip(&from.uvs) {
+                to.extend(from.get(vertices.clone()).into_iter().flatten());
+            }
+            scene.colors.extend(from.colors.get(vertices.clone()).into_iter().flatten());
+            let shifted = |v: u32| (v as usize - vertices.start + first_vertex) as u32;
+            scene.triangles.extend(from.triangles[triangles.clone()].iter().map(|t| t.map(shifted)));
+            scene.triangle_object.extend(triangles.clone().map(|_| scene.objects.len() as u32));
+            scene.triangle_source.extend(&from.triangle_source[triangles.clone()]);
+
+            let mut material = from.materials[object.material].clone();
+            let is_as_it_was = material.clone();
+            if let Some(coat) = placed.coat {
+                for band in 0..3 {
+                    let base = &mut material.base_color[band];
+                    *base = match placed.paint.mean[band] {
+                        mean if placed.paint.is_varied && mean > 0.0 => (*base * (coat[band] / mean)).min(1.0),
+                        _ => coat[band],
+                    };
+                }
+                if !placed.paint.is_varied {
+                    material.metallic = 0.0;
+                }
+            }
+            if let Some(light) = placed.light {
+                let factor = self.lights[light].factor();
+                (0..3).for_each(|band| material.emissive[band] *= factor[band]);
+            }
+            let material = if material == is_as_it_was {
+                object.material
+            } else {
+                scene.materials.push(material);
+                scene.materials.len() - 1
+            };
+            let is_copy = index >= from.objects.len();
+            let source = if is_copy { Source { node: index, mesh: index, ..Source::default() } } else { object.source };
+            scene.objects.push(radiosity_scene::Object {
+                name: object.name.clone(),
+                material,
+                triangles: first_triangle..scene.triangles.len(),
+                vertices: first_vertex..scene.positions.len(),
+                source,
+            });
+        }
+        for light in &self.lights {
+            let factor = light.factor();
+            if let Some(mut point) = light.placed() {
+                (0..3).for_each(|band| point.intensity[band] *= factor[band]);
+                scene.lights.push(point);
+            } else if light.kind == super::LightKind::Sky {
+                let dim = |l: radiosity_scene::Bands| std::array::from_fn(|band| l[band] * factor[band]);
+                scene.sky = match &from.sky {
+                    Sky::Black => Sky::Black,
+                    Sky::Uniform(l) => Sky::Uniform(dim(*l)),
+                    Sky::Overcast { horizontal } => Sky::Overcast { horizontal: dim(*horizontal) },
+                    Sky::Map { width, height, pixels } => {
+                        let pixels = pixels.iter().map(|l| dim(*l)).collect();
+                        Sky::Map { width: *width, height: *height, pixels }
+                    }
+                };
+            }
+        }
+        scene
+    }
+
+    /// The light with a number.
+    pub(super) fn light_of(&self, light: LightId) -> Option<&Light> {
+        self.lights.get(light.0 as usize)
+    }
+}
+
+fn affine(matrix: &[f64; 16]) -> DAffine3 {
+    DAffine3::from_mat4(DMat4::from_cols_array(matrix))
+}
+
+/// Whether a matrix places things as they are, turned, or larger.
+fn check_matrix(matrix: &[f64; 16]) -> Result<DAffine3, EditError> {
+    if matrix.iter().any(|x| !x.is_finite()) {
+        return Err(EditError::NotFinite);
+    }
+    let last = [matrix[3], matrix[7], matrix[11], matrix[15]];
+    if last != [0.0, 0.0, 0.0, 1.0] {
+        return Err(EditError::NotAffine(last));
+    }
+    let placed = affine(matrix);
+    let determinant = placed.matrix3.determinant();
+    // No column may vanish beside the others either: a plate of no thickness has no normals.
+    let lengths = [placed.matrix3.x_axis, placed.matrix3.y_axis, placed.matrix3.z_axis].map(DVec3::length);
+    let volume: f64 = lengths.iter().product();
+    let is_flat = !(determinant > 1e-6 * volume);
+    if is_flat || !(1.0 / MOST_SCALE..=MOST_SCALE).contains(&determinant) {
+        return Err(EditError::Determinant(determinant));
+    }
+    Ok(placed)
+}

@@ -1,0 +1,135 @@
+//! The lights of a session, and the columns that their light is solved in.
+
+use super::model::LightKind;
+use radiosity_scene::{Bands, PointLight, PointLightKind, Scene, luminance};
+use radiosity_transport::live::{Lamp, Live};
+use radiosity_transport::luminaires::BRIGHT;
+
+/// Lights with a column of their own; those beyond share the last one. A column takes 32 bytes per element, and five of them
+/// the time of one solve.
+pub const MOST_COLUMNS: usize = 32;
+
+/// One light.
+#[derive(Clone, Debug)]
+pub struct Light {
+    pub kind: LightKind,
+    pub name: String,
+    pub dimming: f32,
+    pub colour: Bands,
+    /// By columns, from the file's world to its place.
+    pub matrix: [f64; 16],
+    /// As the file has it; none for objects and the sky.
+    pub point: Option<PointLight>,
+    /// The object that it is.
+    pub body: Option<usize>,
+    /// Whether shadow rays go to it; other lights are found by rows.
+    pub is_direct: bool,
+    /// Where its light is solved.
+    pub strand: usize,
+}
+
+impl Light {
+    /// By what its light is multiplied.
+    pub fn factor(&self) -> Bands {
+        self.colour.map(|c| c * self.dimming)
+    }
+
+    /// A light without area where it is now.
+    pub fn placed(&self) -> Option<PointLight> {
+        let mut light = self.point.clone()?;
+        let matrix = glam::DMat4::from_cols_array(&self.matrix);
+        light.position = matrix.transform_point3(light.position);
+        let turned = matrix.transform_vector3(light.direction);
+        light.direction = turned.try_normalize().unwrap_or(light.direction);
+        Some(light)
+    }
+}
+
+/// Lights that are solved together: one, or those beyond [`MOST_COLUMNS`].
+#[derive(Clone, Debug, Default)]
+pub struct Strand {
+    pub lights: Vec<usize>,
+    /// Column of direct light.
+    pub column: Option<usize>,
+    /// Whether its lights are dimmed before it is solved and not after.
+    pub is_shared: bool,
+}
+
+/// Whether an object shines so brightly that shadow rays go to it: as luminaires of batch work, by the brightest of its
+/// triangles; and what rows would not get right, emission that varies within triangles.
+pub fn is_direct(live: &Live, body: usize) -> bool {
+    let bodies = &live.world().bodies;
+    let shape = &bodies[body].shape;
+    let (mut power, mut area) = (0f64, 0f64);
+    for other in bodies.iter().take(live.world().scene.objects.len()) {
+        let shape = &other.shape;
+        let sides = 1.0 + f64::from(u8::from(shape.has_two_sides));
+        for (t, [a, b, c]) in shape.corners.iter().enumerate() {
+            let own = 0.5 * sides * (*b - *a).cross(*c - *a).length();
+            area += own;
+            power += own * shape.exitance.get(t).map_or(0.0, |e| f64::from(luminance(*e)));
+        }
+    }
+    let peak = shape.exitance.iter().map(|e| luminance(*e)).fold(0f32, f32::max);
+    shape.is_varied || shape.is_see_through || f64::from(peak) > BRIGHT * power / area.max(f64::MIN_POSITIVE)
+}
+
+/// The lights of a scene: objects that shine, lights without area, the sky.
+pub fn lights_of(scene: &Scene, live: &Live) -> Vec<Light> {
+    let identity = glam::DMat4::IDENTITY.to_cols_array();
+    let light = |kind, name: &str| Light {
+        kind,
+        name: name.to_owned(),
+        dimming: 1.0,
+        colour: [1.0; 3],
+        matrix: identity,
+        point: None,
+        body: None,
+        is_direct: true,
+        strand: 0,
+    };
+    let mut lights = Vec::new();
+    for (body, object) in scene.objects.iter().enumerate() {
+        if live.world().bodies[body].shape.exitance.iter().flatten().any(|e| *e > 0.0) {
+            let is_direct = is_direct(live, body);
+            lights.push(Light { body: Some(body), is_direct, ..light(LightKind::Object, &object.name) });
+        }
+    }
+    for point in &scene.lights {
+        let kind = match point.kind {
+            PointLightKind::Point => LightKind::Point,
+            PointLightKind::Spot { .. } => LightKind::Spot,
+            PointLightKind::Directional => LightKind::Directional,
+        };
+        lights.push(Light { point: Some(point.clone()), ..light(kind, &point.name) });
+    }
+    if !scene.sky.is_black() {
+        lights.push(Light { is_direct: false, ..light(LightKind::Sky, "sky") });
+    }
+    lights
+}
+
+/// The strand that another light joins, given how many there are.
+pub fn strand_of(strands: &mut Vec<Strand>, light: usize) -> usize {
+    if strands.len() < MOST_COLUMNS {
+        let is_shared = strands.len() + 1 == MOST_COLUMNS;
+        strands.push(Strand { lights: Vec::new(), column: None, is_shared });
+    }
+    let strand = strands.len() - 1;
+    strands[strand].lights.push(light);
+    strand
+}
+
+/// The lamps of a strand's column, with what each is multiplied by in it.
+pub fn lamps(strand: &Strand, lights: &[Light]) -> (Vec<Lamp>, Vec<Bands>) {
+    let direct = strand.lights.iter().map(|light| &lights[*light]).filter(|light| light.is_direct);
+    direct
+        .filter_map(|light| {
+            let lamp = match light.body {
+                Some(body) => Lamp::Body(body),
+                None => Lamp::Point(light.placed()?),
+            };
+            Some((lamp, if strand.is_shared { light.factor() } else { [1.0; 3] }))
+        })
+        .unzip()
+}

@@ -1,0 +1,344 @@
+//! What is read from a session: the model, layers of light, a place on a surface, its rays.
+
+use super::model::{LightKind, Probe};
+use super::{Display, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session};
+use glam::DVec2;
+use radiosity_scene::{Bands, Projection, Side, luminance};
+use radiosity_transport::live::{Chunk, Lanes};
+use std::sync::Arc;
+
+/// Objects and lights that a probe tells of, at most.
+const MOST_TOLD: usize = 8;
+
+/// An object that is less than this part of the scene wide is taken for one that can be moved.
+const MOVABLE: f64 = 0.5;
+
+impl Session {
+    fn display(&self, object: usize) -> &Display {
+        let placed = &self.objects[object];
+        let world = self.live.world();
+        let shape = &world.bodies[object].shape;
+        placed.display.get_or_init(|| Display::new(&self.scene, placed.source, shape, world.half))
+    }
+
+    /// What to draw.
+    pub fn model(&self) -> Model {
+        let world = self.live.world();
+        let extent = |low: glam::DVec3, high: glam::DVec3| (high - low).max_element();
+        let mut bounds: Option<[glam::DVec3; 2]> = None;
+        let mut objects = Vec::with_capacity(self.objects.len());
+        for (index, (placed, body)) in self.objects.iter().zip(&world.bodies).enumerate() {
+            if body.is_present {
+                let (low, high) = (body.bounds.low + world.middle, body.bounds.high + world.middle);
+                bounds = Some(bounds.map_or([low, high], |[a, b]| [a.min(low), b.max(high)]));
+            }
+            let object = &self.scene.objects[placed.source];
+            let material = &self.scene.materials[object.material];
+            let display = self.display(index);
+            let factor = placed.light.map_or([0.0; 3], |light| self.lights[light].factor());
+            let exitance = &body.shape.exitance;
+            let mean: Bands = std::array::from_fn(|band| {
+                exitance.iter().map(|e| e[band]).sum::<f32>() / exitance.len().max(1) as f32
+            });
+            let [r, g, b, _] = material.base_color;
+            let scale: Bands = match placed.coat {
+                Some(coat) => std::array::from_fn(|band| match placed.paint.mean[band] {
+                    mean if mean > 0.0 => coat[band] / mean,
+                    _ => 1.0,
+                }),
+                None => [1.0; 3],
+            };
+            let base = [r, g, b];
+            objects.push(ModelObject {
+                id: ObjectId(index as u32),
+                name: object.name.clone(),
+                group: placed.group,
+                matrix: placed.matrix,
+                positions: display.positions.clone(),
+                normals: display.normals.clone(),
+                uvs: display.uvs.clone(),
+                indices: display.indices.clone(),
+                triangle_of: (0..body.len())
+                    .map(|element| (body.shape.triangles.start + body.shape.place(element).0) as u32)
+                    .collect(),
+                reflectance: placed.coat.unwrap_or(placed.paint.mean),
+                texture: material.base_color_texture.map(|texture| texture.texture),
+                tint: std::array::from_fn(|band| base[band] * scale[band]),
+                emission: std::array::from_fn(|band| mean[band] * factor[band]),
+                deleted: !body.is_present,
+                movable: extent(body.bounds.low, body.bounds.high) < MOVABLE * 2.0 * world.half,
+                light: placed.light.map(|light| LightId(light as u32)),
+            });
+        }
+        Model {
+            name: self.scene.name.clone(),
+            objects,
+            lights: self.model_lights(),
+            cameras: self
+                .scene
+                .cameras
+                .iter()
+                .map(|camera| ModelCamera {
+                    name: camera.name.clone(),
+                    matrix: camera.world_from_camera.to_cols_array(),
+                    vertical_fov: match camera.projection {
+                        Projection::Perspective { vertical_fov } => Some(vertical_fov),
+                        Projection::Orthographic { .. } => None,
+                    },
+                })
+                .collect(),
+            bounds: bounds.unwrap_or([world.middle; 2]).map(|corner| corner.to_array()),
+            up: self.scene.up.direction().to_array(),
+        }
+    }
+
+    fn model_lights(&self) -> Vec<ModelLight> {
+        let world = self.live.world();
+        let of = |(index, light): (usize, &super::Light)| {
+            let placed = light.placed();
+            let position = match (light.body, &placed, light.kind) {
+                (Some(body), ..) => Some(world.bodies[body].bounds.ball().0 + world.middle),
+                (None, Some(point), LightKind::Point | LightKind::Spot) => Some(point.position),
+                _ => None,
+            };
+            let direction = placed.filter(|_| matches!(light.kind, LightKind::Spot | LightKind::Directional));
+            ModelLight {
+                id: LightId(index as u32),
+                name: light.name.clone(),
+                kind: light.kind,
+                dimming: light.dimming,
+                colour: light.colour,
+                position: position.map(|p| p.to_array()),
+                direction: direction.map(|point| point.direction.to_array()),
+                matrix: light.body.map_or(light.matrix, |body| self.objects[body].matrix),
+                object: light.body.map(|body| ObjectId(body as u32)),
+                deleted: !self.is_there(light),
+            }
+        };
+        self.lights.iter().enumerate().map(of).collect()
+    }
+
+    /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, or for
+    /// [`Layer::Error`] its standard error. Empty for an object that there is not. Lights beyond the 31st share one column, and
+    /// [`Layer::Light`] shows what all of them bring.
+    pub fn light(&self, object: ObjectId, layer: Layer) -> Vec<Bands> {
+        let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
+        let by_id = self.layer(layer);
+        let first = body.first as usize;
+        let at = |element: u32| -> Bands {
+            by_id.get(first + element as usize).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]])
+        };
+        let chunks = self.chunks_of(object.0 as usize);
+        let is_buried = |element: u32| {
+            let place = chunks.partition_point(|chunk| chunk.first <= element).saturating_sub(1);
+            chunks.get(place).is_some_and(|chunk| chunk.is_buried((element - chunk.first) as usize))
+        };
+        self.display(object.0 as usize).light(at, is_buried)
+    }
+
+    /// Irradiance of each element of an object, in the order of [`ModelObject::indices`]: lux per band.
+    pub fn irradiance(&self, object: ObjectId) -> Vec<Bands> {
+        let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
+        let shown = self.state.shown.get(body.first as usize..body.dark() as usize).unwrap_or_default();
+        shown.iter().map(|h| [h.0[0], h.0[1], h.0[2]]).collect()
+    }
+
+    /// Area of each element of an object, m².
+    pub fn areas(&self, object: ObjectId) -> Vec<f64> {
+        let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
+        (0..body.len()).map(|element| body.area(element)).collect()
+    }
+
+    fn chunks_of(&self, body: usize) -> &[Chunk] {
+        let chunks = self.live.chunks();
+        let [from, to] = [body, body + 1].map(|body| chunks.partition_point(|chunk| chunk.body < body));
+        &chunks[from..to]
+    }
+
+    fn element(&self, object: ObjectId, triangle: u32) -> Option<(&Chunk, usize)> {
+        let chunks = self.chunks_of(object.0 as usize);
+        let place = chunks.partition_point(|chunk| chunk.first <= triangle).checked_sub(1)?;
+        let element = (triangle - chunks[place].first) as usize;
+        (element < chunks[place].len).then_some((&chunks[place], element))
+    }
+
+    /// A layer by id. The last one is kept, as it is asked for object by object.
+    fn layer(&self, layer: Layer) -> Arc<Vec<Lanes<4>>> {
+        let mut cache = self.cache.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let revision = self.state.revision;
+        if let Some((kept, of, values)) = &*cache
+            && (*kept, *of) == (layer, revision)
+        {
+            return values.clone();
+        }
+        let values = Arc::new(self.find_layer(layer));
+        *cache = Some((layer, revision, values.clone()));
+        values
+    }
+
+    /// Light that comes straight from lights: direct light, and what rows find of emission.
+    fn unreflected(&self) -> Vec<Lanes<4>> {
+        let mut light = vec![Lanes::default(); self.live.ids()];
+        let rays = self.state.solved_rays as usize;
+        let emission = self.emission();
+        if rays > 0 && emission.iter().any(|e| *e != Lanes::default()) {
+            self.live.gather(&emission, rays, &mut light);
+        }
+        for (light, direct) in light.iter_mut().zip(&self.state.direct) {
+            (0..3).for_each(|band| light.0[band] += direct.0[band]);
+        }
+        light
+    }
+
+    fn find_layer(&self, layer: Layer) -> Vec<Lanes<4>> {
+        let state = &self.state;
+        match layer {
+            Layer::Total => state.shown.clone(),
+            Layer::Direct => self.unreflected(),
+            Layer::Indirect => {
+                let direct = self.unreflected();
+                let rest = |(all, direct): (&Lanes<4>, Lanes<4>)| {
+                    Lanes(std::array::from_fn(|k| (all.0[k] - direct.0[k]).max(0.0)))
+                };
+                state.shown.iter().zip(direct).map(rest).collect()
+            }
+            Layer::Bounce(count) => {
+                let mut light = self.unreflected();
+                let nothing = vec![Lanes::default(); light.len()];
+                let mut given = nothing.clone();
+                for _ in 0..if state.solved_rays > 0 { count.min(64) } else { 0 } {
+                    self.answer.respond(&nothing, &light, &mut given);
+                    self.live.gather(&given, state.solved_rays as usize, &mut light);
+                }
+                light
+            }
+            Layer::Light(light) => self.light_of(light).map_or_else(Vec::new, |light| {
+                let strand = &self.strands[light.strand];
+                let factor = self.factor(strand);
+                let mut by_id = vec![Lanes::default(); self.live.ids()];
+                match state.columns.get(light.strand).filter(|column| state.has_columns && !column.is_empty()) {
+                    Some(column) => {
+                        for (h, own) in by_id.iter_mut().zip(column) {
+                            (0..3).for_each(|band| h.0[band] = own[band] * factor[band]);
+                        }
+                    }
+                    None => {
+                        let columns: Vec<(usize, Bands)> = strand.column.map(|c| (c, factor)).into_iter().collect();
+                        let rays = state.solved_rays as usize;
+                        if rays > 0 {
+                            self.live.gather(&self.emission_of(strand, true), rays, &mut by_id);
+                        }
+                        self.live.add_direct(&columns, &mut by_id);
+                    }
+                }
+                by_id
+            }),
+            Layer::Error => {
+                let mut errors = self.standard_errors();
+                errors.iter_mut().for_each(|error| error.0 = error.0.map(f32::abs));
+                errors
+            }
+        }
+    }
+
+    /// What is known of a place on an object: `triangle` counts the object's [`ModelObject::indices`] by threes, `uv` are
+    /// the weights of its corners 1 and 2.
+    pub fn probe(&self, object: ObjectId, triangle: u32, uv: [f32; 2]) -> Option<Probe> {
+        let (chunk, element) = self.element(object, triangle)?;
+        let world = self.live.world();
+        let (body, placed) = (&world.bodies[object.0 as usize], &self.objects[object.0 as usize]);
+        if !body.is_present {
+            return None;
+        }
+        let id = (body.first + triangle) as usize;
+        let (t, side, mut corners) = body.shape.place(triangle);
+        if side == Side::Back {
+            corners.swap(1, 2);
+        }
+        let weights = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
+        let at = corners[0] + weights.x * (corners[1] - corners[0]) + weights.y * (corners[2] - corners[0]);
+        let [a, b, c] = body.corners[t];
+        let position = a + at.x * (b - a) + at.y * (c - a) + world.middle;
+        let normal = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
+
+        let of = |list: &[Lanes<4>]| list.get(id).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]]);
+        let irradiance = of(&self.state.shown);
+        let (reflectance, _) = placed.paint.of(triangle, body.shape.fronts, placed.coat);
+        let factor = placed.light.map_or([0.0; 3], |light| self.lights[light].factor());
+        let exitance = body.shape.exitance.get(t).copied().unwrap_or_default();
+        let passed = self.answer.passed.iter().find(|(side, ..)| *side as usize == id);
+        let behind = passed.map_or([0.0; 3], |(_, other, tau)| {
+            let h = self.state.shown.get(*other as usize).copied().unwrap_or_default();
+            std::array::from_fn(|band| tau[band] * h.0[band])
+        });
+        let radiosity = std::array::from_fn(|band| {
+            exitance[band] * factor[band] + reflectance[band] * irradiance[band] + behind[band]
+        });
+
+        // What each object sends here along the rays of the row.
+        let rays = self.state.solved_rays as usize;
+        let mut objects: std::collections::BTreeMap<usize, Bands> = std::collections::BTreeMap::new();
+        let (mut unreflected, mut error) = (of(&self.state.direct), [0f32; 2]);
+        if rays > 0 && self.state.given.len() == self.live.ids() && !self.state.is_edited {
+            let (row, share) = chunk.row(element, rays);
+            let emission = self.emission();
+            for (m, other) in row.iter().enumerate() {
+                let given = self.state.given[*other as usize].0;
+                let emitted = emission[*other as usize].0;
+                error[usize::from(2 * m >= rays)] += share * luminance([given[0], given[1], given[2]]);
+                (0..3).for_each(|band| unreflected[band] += share * emitted[band]);
+                if let Some(body) = world.body_of_id(*other) {
+                    let sum = objects.entry(body).or_default();
+                    (0..3).for_each(|band| sum[band] += share * (given[band] - emitted[band]));
+                }
+            }
+        }
+        let brightest = |list: &mut Vec<(u32, Bands)>| {
+            list.retain(|(_, light)| luminance(*light) > 0.0);
+            list.sort_by(|a, b| luminance(b.1).total_cmp(&luminance(a.1)).then(a.0.cmp(&b.0)));
+            list.truncate(MOST_TOLD);
+        };
+        let mut objects: Vec<(u32, Bands)> = objects.into_iter().map(|(body, light)| (body as u32, light)).collect();
+        brightest(&mut objects);
+        let mut lights: Vec<(u32, Bands)> = Vec::new();
+        for strand in &self.strands {
+            let factor = self.factor(strand);
+            let column = self.state.columns.get(strand.lights.first().map_or(0, |light| self.lights[*light].strand));
+            let own = match (column.and_then(|column| column.get(id)), strand.column) {
+                (Some(own), _) if self.state.has_columns => *own,
+                (_, Some(column)) => chunk.light(column, element),
+                _ => continue,
+            };
+            if let Some(light) = strand.lights.first() {
+                lights.push((*light as u32, std::array::from_fn(|band| own[band] * factor[band])));
+            }
+        }
+        brightest(&mut lights);
+        Some(Probe {
+            object,
+            triangle: (body.shape.triangles.start + t) as u32,
+            position: position.to_array(),
+            normal: normal.to_array(),
+            lux: luminance(irradiance),
+            irradiance,
+            reflectance,
+            radiosity,
+            direct: unreflected,
+            error: (error[0] - error[1]).abs(),
+            lights: lights.into_iter().map(|(light, bands)| (LightId(light), bands)).collect(),
+            objects: objects.into_iter().map(|(object, bands)| (ObjectId(object), bands)).collect(),
+        })
+    }
+
+    /// The rays of the element that is such a triangle: origin and end, or a point as far as the scene is wide for
+    /// those that escape.
+    pub fn rays(&self, object: ObjectId, triangle: u32) -> Vec<[[f32; 3]; 2]> {
+        let Some((chunk, element)) = self.element(object, triangle) else { return Vec::new() };
+        let world = self.live.world();
+        if !world.bodies[object.0 as usize].is_present {
+            return Vec::new();
+        }
+        let ends = chunk.rays(world, element, 2.0 * world.half);
+        ends.into_iter().map(|ends| ends.map(|p| (p + world.middle).as_vec3().to_array())).collect()
+    }
+}

@@ -1,0 +1,260 @@
+//! One object that can be moved: its triangles as the file has them, cut into elements, and where it is now.
+//!
+//! What is in the world follows from the file's triangles and the matrix alone, so that an object that comes back to a
+//! place has the same bits there.
+
+use glam::{DAffine3, DVec2, DVec3};
+use radiosity_scene::elements::{corners, division_of, locate, triangle_from_square};
+use radiosity_scene::{AlphaMode, Bands, Scene, Side, Surface};
+use radiosity_trace::{Place, Tree};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Places keep off the border of their element by about this many offsets, as ray origins are moved by rounding.
+const BORDER: f64 = 8.0;
+
+/// What objects and their copies have in common.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Triangles of the scene.
+    pub triangles: Range<usize>,
+    /// Corners in the world of the file.
+    pub corners: Vec<[DVec3; 3]>,
+    /// Cells along an edge of each triangle.
+    pub division: Vec<u32>,
+    /// First element of each triangle's front.
+    pub base: Vec<u32>,
+    /// Elements of all fronts; those of backs, if they take part, follow in the same order.
+    pub fronts: u32,
+    /// Whether backs take part in the exchange of light.
+    pub has_two_sides: bool,
+    /// Whether rays may pass through.
+    pub is_see_through: bool,
+    /// Mean exitance of each triangle, lm/m² per band: π L times the opacity. Empty where nothing shines.
+    pub exitance: Vec<Bands>,
+    /// Whether emission or opacity vary over a triangle.
+    pub is_varied: bool,
+    /// Triangle of each front element.
+    triangle_of: Vec<u32>,
+}
+
+/// Places along a side of the grid that emission is averaged over, where it is a picture.
+const GRID: usize = 8;
+
+impl Shape {
+    /// An object of a scene, cut into elements about `size` wide.
+    pub fn new(scene: &Scene, object: usize, size: f64) -> Shape {
+        let triangles = scene.objects[object].triangles.clone();
+        let material = &scene.materials[scene.objects[object].material];
+        let all: Vec<[DVec3; 3]> = triangles.clone().map(|t| scene.corners(t)).collect();
+        let division: Vec<u32> = all.iter().map(|c| division_of(*c, size)).collect();
+        let (mut base, mut triangle_of) = (Vec::with_capacity(all.len()), Vec::new());
+        for (t, k) in division.iter().enumerate() {
+            base.push(triangle_of.len() as u32);
+            triangle_of.extend(std::iter::repeat_n(t as u32, (k * k) as usize));
+        }
+        let is_see_through = material.alpha_mode != AlphaMode::Opaque
+            && (material.base_color[3] < 1.0
+                || !scene.colors.is_empty()
+                || material.base_color_texture.is_some_and(|t| !scene.textures[t.texture].is_opaque()));
+        let is_varied = material.emissive_texture.is_some()
+            || is_see_through && (material.base_color_texture.is_some() || !scene.colors.is_empty());
+        let exitance = |triangle: usize| -> Bands {
+            let n = if is_varied { GRID } else { 1 };
+            let mut sum = [0.0; 3];
+            for i in 0..n * n {
+                let [x, y] = [i % n, i / n].map(|k| (k as f64 + 0.5) / n as f64);
+                let (u, v) = triangle_from_square(x, y);
+                let given = given_at(scene, Surface { triangle, uv: DVec2::new(u, v) });
+                (0..3).for_each(|band| sum[band] += given[band] / (n * n) as f32);
+            }
+            sum
+        };
+        let exitance = if material.emits() { triangles.clone().map(exitance).collect() } else { Vec::new() };
+        Shape {
+            exitance,
+            is_varied,
+            triangles,
+            corners: all,
+            division,
+            base,
+            fronts: triangle_of.len() as u32,
+            has_two_sides: material.has_two_sides(),
+            is_see_through,
+            triangle_of,
+        }
+    }
+
+    /// Number of elements, of backs too.
+    pub fn elements(&self) -> u32 {
+        self.fronts * (1 + u32::from(self.has_two_sides))
+    }
+
+    /// Triangle, side and barycentric corners of an element.
+    pub fn place(&self, element: u32) -> (usize, Side, [DVec2; 3]) {
+        let (front, side) =
+            if element < self.fronts { (element, Side::Front) } else { (element - self.fronts, Side::Back) };
+        let triangle = self.triangle_of[front as usize] as usize;
+        (triangle, side, corners(front - self.base[triangle], self.division[triangle]))
+    }
+
+    /// The element on the other side of an element.
+    pub fn opposite(&self, element: u32) -> Option<u32> {
+        let front = element < self.fronts;
+        self.has_two_sides.then(|| if front { element + self.fronts } else { element - self.fronts })
+    }
+
+    /// The element at a place; none on backs that take no part.
+    #[inline]
+    pub fn at(&self, triangle: u32, u: f32, v: f32, back: bool) -> Option<u32> {
+        let t = triangle as usize;
+        let element = self.base[t] + locate(u, v, self.division[t]).0;
+        match (back, self.has_two_sides) {
+            (false, _) => Some(element),
+            (true, true) => Some(element + self.fronts),
+            (true, false) => None,
+        }
+    }
+}
+
+/// Exitance of a place of the scene, lm/m² per band, as far as it is opaque.
+pub fn given_at(scene: &Scene, at: Surface) -> Bands {
+    let opacity = scene.opacity(at);
+    scene.emitted_luminance(at).map(|l| opacity * l * std::f32::consts::PI)
+}
+
+/// Where an element lies: all that its places need.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    origin: DVec3,
+    edges: [DVec3; 2],
+    /// Unit normal of its side.
+    pub normal: DVec3,
+    /// Middle of a ball around it.
+    pub centre: DVec3,
+    /// Radius of the ball.
+    pub radius: f64,
+    /// Number of the triangle among all.
+    pub triangle: u32,
+}
+
+impl Site {
+    /// The place that (x, y) in the unit square maps to.
+    #[inline]
+    pub fn place(&self, x: f32, y: f32) -> Place {
+        let (u, v) = triangle_from_square(f64::from(x), f64::from(y));
+        let point = self.origin + u * self.edges[0] + v * self.edges[1];
+        Place { point, normal: self.normal, triangle: self.triangle }
+    }
+}
+
+/// A box along the axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Lower corner.
+    pub low: DVec3,
+    /// Upper corner.
+    pub high: DVec3,
+}
+
+impl Bounds {
+    /// The ball around it.
+    pub fn ball(&self) -> (DVec3, f64) {
+        (0.5 * (self.low + self.high), 0.5 * self.low.distance(self.high))
+    }
+
+    /// Whether a ray up to `length` may meet it; never wrong where it says no.
+    #[inline]
+    pub fn may_meet(&self, origin: DVec3, direction: DVec3, length: f64, margin: f64) -> bool {
+        let inverse = 1.0 / direction;
+        let (a, b) = ((self.low - margin - origin) * inverse, (self.high + margin - origin) * inverse);
+        // Where a direction is zero, 0 · ∞ is no number, and `min` and `max` take the other one: nothing is cut off.
+        let (near, far) = (a.min(b), a.max(b));
+        let enter = near.x.max(near.y).max(near.z).max(0.0);
+        let leave = far.x.min(far.y).min(far.z).min(length + margin);
+        !(enter > leave)
+    }
+}
+
+/// An object in the world. Coordinates are about the middle of the scene.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// What it shares with its copies.
+    pub shape: Arc<Shape>,
+    /// Fixes its random choices.
+    pub key: u32,
+    /// Number of its first triangle among all.
+    pub first_triangle: u32,
+    /// Id of its first element; after the last one comes that of its black backs.
+    pub first: u32,
+    /// From the file's world to its place.
+    pub matrix: DAffine3,
+    /// Whether it is there.
+    pub is_present: bool,
+    /// Corners about the middle of the scene.
+    pub corners: Vec<[DVec3; 3]>,
+    /// Unit normals of fronts.
+    pub normals: Vec<DVec3>,
+    /// The box around it.
+    pub bounds: Bounds,
+    /// Its own tree, where it is not where the common one has it.
+    pub tree: Option<Tree>,
+}
+
+impl Body {
+    /// Number of elements.
+    pub fn len(&self) -> u32 {
+        self.shape.elements()
+    }
+
+    /// Id of its black backs.
+    pub fn dark(&self) -> u32 {
+        self.first + self.len()
+    }
+
+    /// Whether an id is one of its own.
+    #[inline]
+    pub fn has(&self, id: u32) -> bool {
+        id.wrapping_sub(self.first) <= self.len()
+    }
+
+    /// Puts it somewhere.
+    pub fn place_at(&mut self, matrix: DAffine3, middle: DVec3) {
+        self.matrix = matrix;
+        self.corners = self.shape.corners.iter().map(|c| c.map(|p| matrix.transform_point3(p) - middle)).collect();
+        self.normals = self.corners.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).normalize_or_zero()).collect();
+        self.bounds = bounds_of(&self.corners);
+    }
+
+    /// Area of an element, m².
+    pub fn area(&self, element: u32) -> f64 {
+        let (t, _, _) = self.shape.place(element);
+        let [a, b, c] = self.corners[t];
+        0.5 * (b - a).cross(c - a).length() / f64::from(self.shape.division[t].pow(2))
+    }
+
+    /// Where an element lies; `offset` is that of ray origins.
+    pub fn site(&self, element: u32, offset: f64) -> Site {
+        let (t, side, uv) = self.shape.place(element);
+        let [p, q, r] = self.corners[t];
+        let [a, b, c] = uv.map(|uv| p + uv.x * (q - p) + uv.y * (r - p));
+        let width = (b - a).cross(c - a).length().sqrt();
+        let inset = (BORDER * offset / width).min(0.25);
+        let centre = (a + b + c) / 3.0;
+        let normal = if side == Side::Front { self.normals[t] } else { -self.normals[t] };
+        Site {
+            origin: a + inset * (centre - a),
+            edges: [b - a, c - a].map(|edge| (1.0 - inset) * edge),
+            normal,
+            centre,
+            radius: a.distance(centre).max(b.distance(centre)).max(c.distance(centre)),
+            triangle: self.first_triangle + t as u32,
+        }
+    }
+}
+
+/// The box around triangles.
+pub fn bounds_of(corners: &[[DVec3; 3]]) -> Bounds {
+    let empty = Bounds { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+    corners.iter().flatten().fold(empty, |b, p| Bounds { low: b.low.min(*p), high: b.high.max(*p) })
+}

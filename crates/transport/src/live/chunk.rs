@@ -1,0 +1,564 @@
+//! Some elements of one object with all their rays: what each met, how far away, and which of them an edit dirties.
+//!
+//! An entry of a row is an id and the distance of the hit. After an object has changed, three kinds of entries are dirty:
+//! those that met it, which are traced anew; those that pass through the box where it is now, which are traced against it
+//! alone; and its own, all of them. The rays to look at are found by cones of directions ([`Strata`]), so that an edit
+//! costs a few rays per element and not all. Shadow rays likewise: stopped ones that pass through the box where the object
+//! was may have come free, free ones that pass through the box where it is may be stopped.
+
+use super::body::{Body, Bounds, Site};
+use super::column::Column;
+use super::strata::{Cells, Strata};
+use super::world::World;
+use glam::DVec3;
+use radiosity_scene::Bands;
+use radiosity_trace::Ray;
+use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
+
+/// Elements of a chunk: a millisecond of work for a few rays each.
+pub const CHUNK: u32 = 64;
+
+/// Columns of a row, and shadow rays of a light, that are looked at first after an edit. A picture of as many is fit to
+/// be shown while the others follow.
+pub const NEAR_RAYS: u32 = 64;
+
+/// The same for shadow rays.
+pub const NEAR_SHADOWS: u32 = 8;
+
+/// The stream of sample points that rows use.
+const ROWS: u32 = 0x0100;
+
+/// Places on an element are told apart by so many cells along each side where some are buried.
+const PLACES: usize = 4;
+
+/// Elements of which less than this part is exposed get no light.
+const LEAST_OPEN: f32 = 1.0 / 16.0;
+
+/// A change of an object or of columns.
+#[derive(Clone, Debug)]
+pub struct Change {
+    /// The object.
+    pub body: usize,
+    /// Where it was, if it was there.
+    pub before: Option<Bounds>,
+}
+
+/// Which of the rays are worked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The first of each row.
+    Near,
+    /// The rest.
+    Far,
+}
+
+/// How many rays there shall be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Target {
+    /// Of each row.
+    pub rays: u32,
+    /// From each element to each column.
+    pub shadows: u32,
+}
+
+impl Target {
+    /// The part of it that comes first.
+    pub fn near(self) -> Target {
+        Target { rays: self.rays.min(NEAR_RAYS), shadows: self.shadows.min(NEAR_SHADOWS) }
+    }
+
+    fn of(self, part: Part) -> Target {
+        if part == Part::Near { self.near() } else { self }
+    }
+}
+
+/// Light of one column.
+#[derive(Clone, Debug, Default)]
+struct Shadows {
+    /// Shadow rays so far.
+    rays: u32,
+    /// Which of them came through, by element.
+    clear: Vec<u64>,
+    /// What they bring, lux per band, by element.
+    light: Vec<Bands>,
+    /// Whether only the first of them are in that.
+    is_rough: Vec<bool>,
+}
+
+/// Some elements of one object.
+#[derive(Clone, Debug)]
+pub struct Chunk {
+    /// The object.
+    pub body: usize,
+    /// First element of the object.
+    pub first: u32,
+    /// Id of that.
+    pub id: usize,
+    /// How many.
+    pub len: usize,
+    /// Rays of each row so far.
+    traced: u32,
+    /// Room for each row.
+    stride: usize,
+    ids: Vec<u32>,
+    keys: Vec<f32>,
+    /// One over the rays that count, of the first part and of all, by element.
+    scale: [Vec<f32>; 2],
+    /// One over the part of each element that is exposed; zero where next to nothing is.
+    open: Vec<f32>,
+    shadows: Vec<Shadows>,
+    /// Changes that have been looked at, for the first part and the rest.
+    seen: [usize; 2],
+}
+
+/// What all chunks need to work.
+pub struct Work<'a> {
+    /// The objects.
+    pub world: &'a World,
+    /// The lights.
+    pub columns: &'a [Column],
+    /// Changes.
+    pub changes: &'a [Change],
+    /// Cells for rows of as many rays as there are, and of the first part of them.
+    pub strata: &'a [Strata; 2],
+    /// How many rays there shall be.
+    pub target: Target,
+    /// Whether black backs have an id.
+    pub is_dark: &'a [bool],
+}
+
+/// An object that has changed: ids, whether it is there, and the balls and boxes where it was and is.
+struct Dirty<'a> {
+    body: usize,
+    own: &'a Body,
+    now: Option<Bounds>,
+}
+
+struct Dirt<'a> {
+    bodies: Vec<Dirty<'a>>,
+    before: Vec<Bounds>,
+    now: Vec<Bounds>,
+    balls: Vec<(DVec3, f64)>,
+}
+
+impl<'a> Dirt<'a> {
+    fn new(world: &'a World, changes: &[Change]) -> Dirt<'a> {
+        let mut dirt = Dirt { bodies: Vec::new(), before: Vec::new(), now: Vec::new(), balls: Vec::new() };
+        for change in changes {
+            if let Some(bounds) = change.before
+                && !dirt.before.contains(&bounds)
+            {
+                dirt.before.push(bounds);
+            }
+            if dirt.bodies.iter().all(|other| other.body != change.body) {
+                let own = &world.bodies[change.body];
+                let now = own.is_present.then_some(own.bounds);
+                dirt.now.extend(now);
+                dirt.bodies.push(Dirty { body: change.body, own, now });
+            }
+        }
+        let margin = 4.0 * world.offset;
+        for bounds in dirt.before.iter().chain(&dirt.now) {
+            let (centre, radius) = bounds.ball();
+            dirt.balls.push((centre, radius + margin));
+        }
+        dirt
+    }
+}
+
+impl Chunk {
+    /// Elements `first..first + len` of an object, for rows of `stride` rays at most.
+    pub fn new(world: &World, body: usize, first: u32, len: u32, stride: u32, columns: usize) -> Chunk {
+        let n = len as usize;
+        let mut chunk = Chunk {
+            body,
+            first,
+            id: (world.bodies[body].first + first) as usize,
+            len: n,
+            traced: 0,
+            stride: stride as usize,
+            ids: vec![0; n * stride as usize],
+            keys: vec![0.0; n * stride as usize],
+            scale: [vec![0.0; n], vec![0.0; n]],
+            open: vec![0.0; n],
+            shadows: Vec::new(),
+            seen: [0; 2],
+        };
+        chunk.make_columns(columns);
+        chunk
+    }
+
+    /// Bytes of an element with rows of `rays` rays and so many columns.
+    pub fn bytes(rays: u32, columns: usize) -> usize {
+        rays as usize * (size_of::<u32>() + size_of::<f32>())
+            + columns * (size_of::<u64>() + size_of::<Bands>())
+            + 3 * size_of::<f32>()
+    }
+
+    /// Makes room for more columns.
+    pub fn make_columns(&mut self, columns: usize) {
+        let empty = Shadows {
+            rays: 0,
+            clear: vec![0; self.len],
+            light: vec![[0.0; 3]; self.len],
+            is_rough: vec![false; self.len],
+        };
+        self.shadows.resize(columns, empty);
+    }
+
+    /// Forgets all rays: the object is elsewhere.
+    pub fn forget(&mut self) {
+        self.traced = 0;
+        (0..self.shadows.len()).for_each(|column| self.forget_column(column));
+    }
+
+    /// Forgets the shadow rays to one column.
+    pub fn forget_column(&mut self, column: usize) {
+        let shadows = &mut self.shadows[column];
+        shadows.rays = 0;
+        shadows.clear.fill(0);
+        shadows.light.fill([0.0; 3]);
+        shadows.is_rough.fill(false);
+    }
+
+    /// Adds up the light of a column anew, whose strengths have changed.
+    pub fn add_up(&mut self, work: &Work, column: usize) {
+        let body = &work.world.bodies[self.body];
+        if !body.is_present {
+            return;
+        }
+        for e in 0..self.len {
+            let (site, seed) = self.site(work.world, e);
+            let shadows = &self.shadows[column];
+            let (n, clear) = (shadows.rays, shadows.clear[e]);
+            self.shadows[column].light[e] = bring(work, column, (&site, seed), n, clear);
+            self.shadows[column].is_rough[e] = false;
+        }
+    }
+
+    /// Takes no notice of changes up to a number: there are none any more.
+    pub fn reset_seen(&mut self) {
+        self.seen = [0; 2];
+    }
+
+    /// Rays of each row so far.
+    pub fn traced(&self) -> u32 {
+        self.traced
+    }
+
+    /// Whether there is something to do for a part.
+    pub fn needs(&self, work: &Work, part: Part) -> bool {
+        let target = work.target.of(part);
+        work.world.bodies[self.body].is_present
+            && (self.seen[part as usize] < work.changes.len()
+                || part == Part::Far && self.seen[0] < work.changes.len()
+                || self.traced < target.rays
+                || self.shadows.iter().any(|s| s.rays < target.shadows))
+    }
+
+    /// Does what there is to do for a part; answers how many rays were traced.
+    pub fn work(&mut self, work: &Work, part: Part) -> u64 {
+        let mut rays = 0;
+        if part == Part::Far && self.seen[0] < work.changes.len() {
+            rays += self.work(work, Part::Near);
+        }
+        let target = work.target.of(part);
+        let changes = &work.changes[self.seen[part as usize].min(work.changes.len())..];
+        // What was traced before the changes, of this part.
+        let known = match part {
+            Part::Near => 0..self.traced.min(target.rays),
+            Part::Far => NEAR_RAYS.min(self.traced)..self.traced,
+        };
+        let dirt = Dirt::new(work.world, changes);
+        if !dirt.bodies.is_empty() {
+            if !known.is_empty() {
+                for e in 0..self.len {
+                    rays += self.mend_row(work, part, &dirt, e, known.clone());
+                }
+            }
+            for column in 0..self.shadows.len() {
+                rays += self.mend_shadows(work, part, &dirt, column);
+            }
+        }
+        self.seen[part as usize] = work.changes.len();
+        if self.traced <= NEAR_RAYS && self.shadows.iter().all(|s| s.rays <= NEAR_SHADOWS) {
+            // There is no rest yet that could be dirty.
+            self.seen[1] = self.seen[1].max(self.seen[0]).min(work.changes.len());
+        }
+        if self.traced < target.rays {
+            rays += u64::from(target.rays - self.traced) * self.len as u64;
+            for e in 0..self.len {
+                self.trace_row(work.world, e, self.traced..target.rays);
+            }
+            self.traced = target.rays;
+            (0..self.len).for_each(|e| self.weigh(work, e));
+        }
+        for column in 0..self.shadows.len() {
+            if self.shadows[column].rays < target.shadows {
+                rays += self.trace_shadows(work, column, target.shadows);
+            }
+        }
+        rays
+    }
+
+    fn site(&self, world: &World, e: usize) -> (Site, u32) {
+        let body = &world.bodies[self.body];
+        let element = self.first + e as u32;
+        (body.site(element, world.offset), hash(body.key ^ hash(element)))
+    }
+
+    fn trace_row(&mut self, world: &World, e: usize, range: std::ops::Range<u32>) {
+        let (site, seed) = self.site(world, e);
+        let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
+        for m in range {
+            let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
+            let met = world.first(&ray, salt);
+            let at = e * self.stride + m as usize;
+            self.ids[at] = world.id(met, direction);
+            self.keys[at] = met.map_or(f32::INFINITY, |met| met.key);
+        }
+    }
+
+    /// Works out what rays of a row count, after some were traced.
+    fn weigh(&mut self, work: &Work, e: usize) {
+        let row = &self.ids[e * self.stride..][..self.traced as usize];
+        let near = row.len().min(NEAR_RAYS as usize);
+        if row.iter().all(|id| !work.is_dark[*id as usize]) {
+            self.scale[0][e] = 1.0 / near as f32;
+            self.scale[1][e] = 1.0 / row.len() as f32;
+            self.open[e] = 1.0;
+            return;
+        }
+        let (_, seed) = self.site(work.world, e);
+        let sequence = Sequence::new(seed, ROWS);
+        for (scale, n) in [(0, near), (1, row.len())] {
+            let (kept, open) = exposed(&row[..n], &sequence, work.is_dark);
+            self.scale[scale][e] = if open >= LEAST_OPEN { 1.0 / kept as f32 } else { 0.0 };
+            self.open[e] = if open >= LEAST_OPEN { 1.0 / open } else { 0.0 };
+        }
+    }
+
+    /// Traces the entries of a row that changes have dirtied.
+    fn mend_row(&mut self, work: &Work, part: Part, dirt: &Dirt, e: usize, known: std::ops::Range<u32>) -> u64 {
+        let world = work.world;
+        let (site, seed) = self.site(world, e);
+        let frame = frame(site.normal);
+        let strata = &work.strata[part as usize];
+        let mut cells = Cells::default();
+        for (centre, radius) in &dirt.balls {
+            let along = *centre - site.centre;
+            let reach = radius + site.radius;
+            if along.dot(site.normal) <= -reach {
+                continue;
+            }
+            let distance = along.length();
+            if distance <= 1.001 * reach {
+                cells = Cells::ALL;
+                break;
+            }
+            let sine = reach / distance;
+            let direction = DVec3::from_array(frame.map(|axis| axis.dot(along) / distance));
+            strata.towards(direction, ((1.0 - sine * sine).sqrt(), sine), &mut cells);
+        }
+        if cells.is_empty() {
+            return 0;
+        }
+        let sequence = Sequence::new(seed, ROWS);
+        let margin = 4.0 * world.offset;
+        let (mut rays, mut has_changed) = (0, false);
+        strata.rays(&cells, &sequence, |m| {
+            if !known.contains(&m) {
+                return;
+            }
+            let at = e * self.stride + m as usize;
+            let (id, key) = (self.ids[at], self.keys[at]);
+            let mut is_lost = dirt.bodies.iter().any(|dirty| dirty.own.has(id));
+            if !is_lost && dirt.now.is_empty() {
+                return;
+            }
+            let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
+            let mut best: Option<(f32, u32)> = None;
+            if !is_lost {
+                let (origin, along) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+                for dirty in &dirt.bodies {
+                    let Some(bounds) = dirty.now else { continue };
+                    let limit = best.map_or(key, |(key, _)| key);
+                    if !bounds.may_meet(origin, along, f64::from(limit), margin) {
+                        continue;
+                    }
+                    rays += 1;
+                    let Some(met) = world.first_of(dirty.body, &ray, salt, limit) else { continue };
+                    if met.key < limit {
+                        best = Some((met.key, world.id(Some(met), direction)));
+                    } else {
+                        // At the same distance the number of the triangle decides, which is not kept.
+                        is_lost = true;
+                    }
+                }
+            }
+            if is_lost {
+                rays += 1;
+                let met = world.first(&ray, salt);
+                best = Some((met.map_or(f32::INFINITY, |met| met.key), world.id(met, direction)));
+            }
+            if let Some((key, id)) = best {
+                has_changed |= self.ids[at] != id;
+                (self.keys[at], self.ids[at]) = (key, id);
+            }
+        });
+        if has_changed {
+            self.weigh(work, e);
+        }
+        rays
+    }
+
+    /// Traces the shadow rays to a column that changes have dirtied.
+    fn mend_shadows(&mut self, work: &Work, part: Part, dirt: &Dirt, column: usize) -> u64 {
+        let known = self.shadows[column].rays;
+        let light = &work.columns[column];
+        if known == 0 || light.is_empty() {
+            return 0;
+        }
+        let range = match part {
+            Part::Near => 0..known.min(NEAR_SHADOWS),
+            Part::Far => NEAR_SHADOWS.min(known)..known,
+        };
+        let (world, margin) = (work.world, 4.0 * work.world.offset);
+        let mut rays = 0;
+        for e in 0..self.len {
+            let (site, seed) = self.site(world, e);
+            if !dirt.balls.iter().any(|ball| light.may_meet(&site, *ball)) {
+                continue;
+            }
+            let sequence = light.sequence(seed);
+            let mut clear = self.shadows[column].clear[e];
+            for index in range.clone() {
+                let Some(sample) = light.sample(world, &site, (seed, &sequence), index) else { continue };
+                let bit = 1u64 << index;
+                let (origin, direction) = (sample.ray.origin.as_dvec3(), sample.ray.direction.as_dvec3());
+                let meets = |bounds: &Bounds| bounds.may_meet(origin, direction, f64::from(sample.ray.t_max), margin);
+                if clear & bit == 0 {
+                    if dirt.before.iter().any(meets) {
+                        rays += 1;
+                        if !world.blocked(&sample.ray, sample.salt) {
+                            clear |= bit;
+                        }
+                    }
+                } else if dirt.now.iter().any(meets) {
+                    rays += 1;
+                    if dirt.bodies.iter().any(|dirty| world.blocked_by(dirty.body, &sample.ray, sample.salt)) {
+                        clear &= !bit;
+                    }
+                }
+            }
+            let own = &mut self.shadows[column];
+            if std::mem::replace(&mut own.clear[e], clear) == clear && !(part == Part::Far && own.is_rough[e]) {
+                continue;
+            }
+            own.is_rough[e] = part == Part::Near && known > NEAR_SHADOWS;
+            let n = if own.is_rough[e] { NEAR_SHADOWS } else { known };
+            own.light[e] = bring(work, column, (&site, seed), n, clear);
+        }
+        rays
+    }
+
+    fn trace_shadows(&mut self, work: &Work, column: usize, target: u32) -> u64 {
+        let (world, light) = (work.world, &work.columns[column]);
+        let from = std::mem::replace(&mut self.shadows[column].rays, target);
+        if light.is_empty() {
+            return 0;
+        }
+        let mut rays = 0;
+        for e in 0..self.len {
+            let (site, seed) = self.site(world, e);
+            let sequence = light.sequence(seed);
+            let mut clear = self.shadows[column].clear[e];
+            for index in from..target {
+                if let Some(sample) = light.sample(world, &site, (seed, &sequence), index) {
+                    rays += 1;
+                    if !world.blocked(&sample.ray, sample.salt) {
+                        clear |= 1 << index;
+                    }
+                }
+            }
+            self.shadows[column].clear[e] = clear;
+            self.shadows[column].light[e] = bring(work, column, (&site, seed), target, clear);
+            self.shadows[column].is_rough[e] = false;
+        }
+        rays
+    }
+
+    /// Whether next to nothing of an element is exposed, so that it gets no light.
+    pub fn is_buried(&self, e: usize) -> bool {
+        self.open[e] == 0.0
+    }
+
+    /// What a column brings directly to an element, lux per band.
+    #[inline]
+    pub fn light(&self, column: usize, e: usize) -> Bands {
+        self.shadows[column].light[e].map(|x| x * self.open[e])
+    }
+
+    /// The ids of the first `rays` entries of a row, and what each entry weighs.
+    #[inline]
+    pub fn row(&self, e: usize, rays: usize) -> (&[u32], f32) {
+        let part = usize::from(rays > NEAR_RAYS as usize);
+        (&self.ids[e * self.stride..][..rays], self.scale[part][e])
+    }
+
+    /// The rays of a row: origin and end about the middle of the scene, `far` where they escape.
+    pub fn rays(&self, world: &World, e: usize, far: f64) -> Vec<[DVec3; 2]> {
+        let (site, seed) = self.site(world, e);
+        let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
+        let keys = &self.keys[e * self.stride..][..self.traced as usize];
+        let ray = |(m, key): (usize, &f32)| {
+            let (ray, direction, _) = shoot(world, &site, (&sequence, seed), &frame, m as u32);
+            let origin = ray.origin.as_dvec3();
+            [origin, origin + direction * if key.is_finite() { f64::from(*key) } else { far }]
+        };
+        keys.iter().enumerate().map(ray).collect()
+    }
+}
+
+/// Ray m of a row.
+#[inline]
+fn shoot(
+    world: &World,
+    site: &Site,
+    (sequence, seed): (&Sequence, u32),
+    frame: &[DVec3; 3],
+    m: u32,
+) -> (Ray, DVec3, u32) {
+    let [u, v, x, y] = sequence.point(m);
+    let direction = cosine_direction(frame, f64::from(u), f64::from(v));
+    (world.ray(&site.place(x, y), direction, f64::INFINITY), direction, hash(hash(seed) ^ m))
+}
+
+/// What the first `n` shadow rays bring, given which are clear.
+fn bring(work: &Work, column: usize, (site, seed): (&Site, u32), n: u32, clear: u64) -> Bands {
+    let light = &work.columns[column];
+    let sequence = light.sequence(seed);
+    let mut sum = [0f64; 3];
+    for index in (0..n).filter(|index| clear >> index & 1 == 1) {
+        if let Some(sample) = light.sample(work.world, site, (seed, &sequence), index) {
+            (0..3).for_each(|band| sum[band] += sample.light[band]);
+        }
+    }
+    sum.map(|s| (s / f64::from(n.max(1))) as f32)
+}
+
+/// How many rays of a row start from the exposed part of the element, and how large that part is. A part all of whose
+/// rays meet black backs lies in a solid: nobody sees it, so it does not count. Single backs do; they are black.
+fn exposed(row: &[u32], sequence: &Sequence, is_dark: &[bool]) -> (u32, f32) {
+    let mut rays = [0u32; PLACES * PLACES];
+    let mut seen = [false; PLACES * PLACES];
+    for (m, id) in row.iter().enumerate() {
+        let [_, _, x, y] = sequence.point(m as u32);
+        let cell = |x: f32| ((x * PLACES as f32) as usize).min(PLACES - 1);
+        let place = cell(y) * PLACES + cell(x);
+        rays[place] += 1;
+        seen[place] |= !is_dark[*id as usize];
+    }
+    let kept: u32 = rays.iter().zip(seen).filter(|(_, seen)| *seen).map(|(rays, _)| rays).sum();
+    (kept, kept as f32 / row.len().max(1) as f32)
+}

@@ -1,0 +1,214 @@
+//! A column of light: what one light, or a group of them, gives directly to elements.
+//!
+//! Each element has a fixed list of shadow rays to each column: a place on itself and a place on the light, drawn by the
+//! share of power and, on near surfaces, by the solid angle. What became of each is one bit, so that an edit looks only
+//! at those that it can have changed, and a dimmed light needs none.
+//! Lights beyond the first thirty-odd share columns; to dim one of them means to add up its column anew.
+
+use super::body::{Bounds, Site, bounds_of, given_at};
+use super::world::World;
+use crate::luminaires::Piece;
+use crate::one_light::sample_piece;
+use glam::{DVec2, DVec3};
+use radiosity_scene::{Bands, PointLight, PointLightKind, Side, Surface, luminance};
+use radiosity_trace::sampling::{Sequence, hash};
+use radiosity_trace::{Place, Ray};
+
+/// The stream of sample points that shadow rays use.
+const SHADOW: u32 = 0x0700;
+
+/// A light of a column.
+#[derive(Clone, Debug)]
+pub enum Lamp {
+    /// An object that shines.
+    Body(usize),
+    /// A light without area, where it is now.
+    Point(PointLight),
+}
+
+/// One light or a group.
+#[derive(Clone, Debug)]
+pub struct Column {
+    key: u32,
+    emitters: Vec<Emitter>,
+    /// Running sum of the emitters' shares of the power, ending at 1.
+    cumulative: Vec<f64>,
+    /// A ball around all of them; none if one is infinitely far.
+    ball: Option<(DVec3, f64)>,
+    /// By what the light of each lamp is multiplied.
+    pub strength: Vec<Bands>,
+}
+
+#[derive(Clone, Debug)]
+struct Emitter {
+    lamp: usize,
+    source: Source,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    /// A triangle; with the first triangle of its object among all, and in the scene.
+    Piece(Piece, usize),
+    /// With the position about the middle of the scene.
+    Point(PointLight),
+}
+
+/// One shadow ray.
+pub struct Sample {
+    /// The ray.
+    pub ray: Ray,
+    /// What it brings if nothing stops it, lux per band.
+    pub light: [f64; 3],
+    /// Decides whether blended surfaces stop it.
+    pub salt: u32,
+}
+
+impl Column {
+    /// The column of some lamps; `key` fixes its random choices.
+    pub fn new(world: &World, key: u32, lamps: &[Lamp]) -> Column {
+        let (mut emitters, mut powers) = (Vec::new(), Vec::new());
+        let mut bounds = bounds_of(&[]);
+        let mut is_bounded = true;
+        for (index, lamp) in lamps.iter().enumerate() {
+            match lamp {
+                Lamp::Body(body) => {
+                    let body = &world.bodies[*body];
+                    if !body.is_present {
+                        continue;
+                    }
+                    let Bounds { low, high } = body.bounds;
+                    bounds = Bounds { low: bounds.low.min(low), high: bounds.high.max(high) };
+                    for (t, exitance) in body.shape.exitance.iter().enumerate() {
+                        let sides = [Side::Front, Side::Back];
+                        for side in sides.into_iter().take(1 + usize::from(body.shape.has_two_sides)) {
+                            let [a, b, c] = body.corners[t];
+                            let front = side == Side::Front;
+                            let area = 0.5 * (b - a).cross(c - a).length();
+                            let power = area * f64::from(luminance(*exitance));
+                            if power > 0.0 {
+                                let piece = Piece {
+                                    triangle: body.first_triangle + t as u32,
+                                    side,
+                                    corners: if front { [a, b, c] } else { [a, c, b] },
+                                    normal: if front { body.normals[t] } else { -body.normals[t] },
+                                    exitance: *exitance,
+                                    area,
+                                    varied: body.shape.is_varied,
+                                };
+                                let triangle = body.shape.triangles.start + t;
+                                emitters.push(Emitter { lamp: index, source: Source::Piece(piece, triangle) });
+                                powers.push(power);
+                            }
+                        }
+                    }
+                }
+                Lamp::Point(light) => {
+                    let mut light = light.clone();
+                    light.position -= world.middle;
+                    let intensity = f64::from(luminance(light.intensity));
+                    // The flux of a point, and of parallel light into the scene: only shares of a group hang on it.
+                    powers.push(match light.kind {
+                        PointLightKind::Directional => intensity * 4.0 * world.half * world.half,
+                        _ => intensity * 4.0 * std::f64::consts::PI,
+                    });
+                    if light.kind == PointLightKind::Directional {
+                        is_bounded = false;
+                    } else {
+                        let at = light.position;
+                        bounds = Bounds { low: bounds.low.min(at), high: bounds.high.max(at) };
+                    }
+                    emitters.push(Emitter { lamp: index, source: Source::Point(light) });
+                }
+            }
+        }
+        let total: f64 = powers.iter().sum();
+        let mut running = 0.0;
+        let cumulative = powers
+            .iter()
+            .map(|power| {
+                running += power;
+                if total > 0.0 { running / total } else { 0.0 }
+            })
+            .collect();
+        let ball = (is_bounded && !emitters.is_empty()).then(|| bounds.ball());
+        Column { key, emitters, cumulative, ball, strength: vec![[1.0; 3]; lamps.len()] }
+    }
+
+    /// Whether it gives no light.
+    pub fn is_empty(&self) -> bool {
+        self.cumulative.last().is_none_or(|end| *end <= 0.0)
+    }
+
+    /// The points that an element's shadow rays are made from.
+    pub fn sequence(&self, seed: u32) -> Sequence {
+        Sequence::new(seed, SHADOW ^ hash(self.key))
+    }
+
+    /// Whether shadow rays of an element may meet a ball; never wrong where it says no.
+    pub fn may_meet(&self, site: &Site, (centre, radius): (DVec3, f64)) -> bool {
+        let Some((light, own)) = self.ball else { return true };
+        let along = light - site.centre;
+        let square = along.length_squared();
+        let share = if square > 0.0 { ((centre - site.centre).dot(along) / square).clamp(0.0, 1.0) } else { 0.0 };
+        (site.centre + share * along).distance(centre) <= 1.001 * (radius + own.max(site.radius))
+    }
+
+    /// Shadow ray `index` of an element; none where nothing can arrive.
+    pub fn sample(&self, world: &World, site: &Site, (seed, sequence): (u32, &Sequence), index: u32) -> Option<Sample> {
+        let [u, v, x, y] = sequence.point(index);
+        let place = site.place(x, y);
+        let u = f64::from(u);
+        let k = self.cumulative.partition_point(|end| *end <= u).min(self.emitters.len().checked_sub(1)?);
+        let below = if k == 0 { 0.0 } else { self.cumulative[k - 1] };
+        let share = self.cumulative[k] - below;
+        if share <= 0.0 {
+            return None;
+        }
+        let Emitter { lamp, source } = &self.emitters[k];
+        let salt = hash(seed ^ hash(self.key ^ index));
+        let strength = self.strength[*lamp];
+        let lit = |weight: f64, given: Bands| -> [f64; 3] {
+            std::array::from_fn(|band| weight * f64::from(given[band]) * f64::from(strength[band]))
+        };
+        match source {
+            Source::Piece(piece, triangle) => {
+                let stretched = ((u - below) / share).clamp(0.0, 1.0 - 1e-9);
+                let (target, weight) = sample_piece(piece, &place, stretched, f64::from(v));
+                if weight <= 0.0 {
+                    return None;
+                }
+                let given =
+                    if piece.varied { emission_at(world, piece, *triangle, target.point) } else { piece.exitance };
+                let ray = between(world, &place, &target);
+                Some(Sample { ray, light: lit(weight / share, given), salt })
+            }
+            Source::Point(light) => {
+                let (direction, distance, arriving) = light.arrival(place.point);
+                let cosine = direction.dot(place.normal);
+                if cosine <= 0.0 || luminance(arriving) <= 0.0 {
+                    return None;
+                }
+                let ray = world.ray(&place, direction, (distance - world.offset).max(0.0));
+                Some(Sample { ray, light: lit(cosine / share, arriving), salt })
+            }
+        }
+    }
+}
+
+/// The ray between two places, both moved off their surfaces.
+fn between(world: &World, from: &Place, to: &Place) -> Ray {
+    let origin = from.point + world.offset * from.normal;
+    let along = to.point + world.offset * to.normal - origin;
+    let length = along.length();
+    world.ray(from, along / length.max(f64::MIN_POSITIVE), length)
+}
+
+/// Exitance of a piece at a point of it, where the emission is a picture.
+fn emission_at(world: &World, piece: &Piece, triangle: usize, point: DVec3) -> Bands {
+    let [a, b, c] = piece.corners;
+    let normal = (b - a).cross(c - a);
+    let (from, square) = (point - a, normal.length_squared());
+    let uv = DVec2::new(from.cross(c - a).dot(normal), (b - a).cross(from).dot(normal)) / square;
+    let uv = if piece.side == Side::Front { uv } else { DVec2::new(uv.y, uv.x) };
+    given_at(&world.scene, Surface { triangle, uv: uv.clamp(DVec2::ZERO, DVec2::ONE) })
+}

@@ -1,0 +1,278 @@
+//! All objects, and who is met first among them.
+//!
+//! One tree of boxes has all objects as they were when it was built; those that were moved since are passed there and
+//! have trees of their own. Which hit counts depends on the triangles alone: the smallest key, of equal ones the lowest
+//! number. So hits do not depend on how the objects are shared out among the trees.
+
+use super::body::{Body, Bounds, Shape};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
+use radiosity_scene::{Scene, SkyPatches, Surface};
+use radiosity_trace::sampling::{hash, unit};
+use radiosity_trace::{Hit, Place, Ray, Tree};
+use std::sync::Arc;
+
+/// How far from the middle objects may be, in half extents of the scene as it was handed in.
+pub const REACH: f64 = 4.0;
+
+/// Objects with trees of their own beyond which one tree is built for all: each costs every ray a look at its box.
+const MOST_APART: usize = 6;
+
+/// All objects.
+pub struct World {
+    /// The scene as handed in, for its pictures.
+    pub scene: Arc<Scene>,
+    /// The objects; those taken away too.
+    pub bodies: Vec<Body>,
+    /// The sky's patches, which have the first ids.
+    pub sky: SkyPatches,
+    /// Middle of the scene as handed in.
+    pub middle: DVec3,
+    /// Half its extent, metres.
+    pub half: f64,
+    /// By how much ray origins are moved off their surface, metres.
+    pub offset: f64,
+    /// Object of each triangle.
+    body_of: Vec<u32>,
+    common: Tree,
+    /// Whether each object is not where the common tree has it.
+    is_away: Vec<bool>,
+    /// Whether every ray stops where the common tree says.
+    is_plain: bool,
+    /// Objects with trees of their own.
+    apart: Vec<u32>,
+    is_opaque: bool,
+    /// Next free id.
+    ids: u32,
+}
+
+/// What a ray met.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    /// The distance by which hits compete.
+    pub key: f32,
+    /// Number of the triangle among all.
+    pub triangle: u32,
+    /// Weights of its corners 1 and 2.
+    pub uv: [f32; 2],
+    /// Whether its back was met.
+    pub back: bool,
+}
+
+impl World {
+    /// All objects of a scene, cut into elements about `size` wide.
+    pub fn new(scene: Arc<Scene>, size: f64) -> World {
+        let [low, high] = scene.bounding_box().unwrap_or([DVec3::ZERO; 2]);
+        let half = (0.5 * (high - low)).max_element().max(f64::MIN_POSITIVE);
+        let sky = SkyPatches::new(&scene.sky, scene.up.direction());
+        let mut world = World {
+            bodies: Vec::new(),
+            sky,
+            middle: 0.5 * (low + high),
+            half,
+            // That of batch work (2^-21 of half the extent), twice since objects may be moved to where single precision
+            // is coarser.
+            offset: half * 2f64.powi(-20),
+            body_of: Vec::new(),
+            common: Tree::new(&[]),
+            is_away: Vec::new(),
+            is_plain: false,
+            apart: Vec::new(),
+            is_opaque: true,
+            ids: sky.len() as u32,
+            scene: scene.clone(),
+        };
+        for object in 0..scene.objects.len() {
+            world.add(Arc::new(Shape::new(&scene, object, size)), DAffine3::IDENTITY);
+        }
+        world.gather_trees();
+        world
+    }
+
+    /// Number of ids: the sky's patches, then for each object its elements and its black backs.
+    pub fn ids(&self) -> usize {
+        self.ids as usize
+    }
+
+    /// Adds an object, without a tree; answers its number.
+    pub fn add(&mut self, shape: Arc<Shape>, matrix: DAffine3) -> usize {
+        let body = self.bodies.len();
+        let first_triangle = self.body_of.len() as u32;
+        self.body_of.extend(std::iter::repeat_n(body as u32, shape.corners.len()));
+        self.is_opaque &= !shape.is_see_through;
+        let first = self.ids;
+        self.ids += shape.elements() + 1;
+        let mut added = Body {
+            shape,
+            key: hash(body as u32 ^ 0x0b0d_1e55),
+            first_triangle,
+            first,
+            matrix,
+            is_present: true,
+            corners: Vec::new(),
+            normals: Vec::new(),
+            bounds: Bounds { low: DVec3::ZERO, high: DVec3::ZERO },
+            tree: None,
+        };
+        added.place_at(matrix, self.middle);
+        self.bodies.push(added);
+        self.is_away.push(true);
+        self.is_plain = false;
+        body
+    }
+
+    /// Puts an object elsewhere, or brings it back, with a tree of its own.
+    pub fn place(&mut self, body: usize, matrix: DAffine3) {
+        let own = &mut self.bodies[body];
+        own.place_at(matrix, self.middle);
+        own.is_present = true;
+        own.tree = Some(Tree::new(&single(&own.corners)).as_part((REACH * self.half) as f32));
+        self.is_away[body] = true;
+        self.is_plain = false;
+        if !self.apart.contains(&(body as u32)) {
+            self.apart.push(body as u32);
+            self.apart.sort_unstable();
+        }
+    }
+
+    /// Takes an object away.
+    pub fn remove(&mut self, body: usize) {
+        self.bodies[body].is_present = false;
+        self.bodies[body].tree = None;
+        self.is_away[body] = true;
+        self.is_plain = false;
+        self.apart.retain(|other| *other != body as u32);
+    }
+
+    /// Whether so many objects have trees of their own that one for all is better.
+    pub fn is_scattered(&self) -> bool {
+        self.apart.len() > MOST_APART
+    }
+
+    /// Builds one tree for all objects.
+    pub fn gather_trees(&mut self) {
+        let mut corners = Vec::with_capacity(self.body_of.len());
+        for body in &mut self.bodies {
+            if body.is_present {
+                corners.extend(single(&body.corners));
+            } else {
+                corners.extend(std::iter::repeat_n([Vec3::NAN; 3], body.corners.len()));
+            }
+            body.tree = None;
+        }
+        self.common = Tree::new(&corners).as_part((REACH * self.half) as f32);
+        self.is_away.fill(false);
+        self.is_plain = self.is_opaque;
+        self.apart.clear();
+    }
+
+    /// The object of a triangle.
+    pub fn body_of(&self, triangle: u32) -> usize {
+        self.body_of[triangle as usize] as usize
+    }
+
+    /// The object that an id belongs to; none for the sky.
+    pub fn body_of_id(&self, id: u32) -> Option<usize> {
+        self.bodies.partition_point(|body| body.first <= id).checked_sub(1)
+    }
+
+    /// The ray that leaves a place. It does not meet the triangle of the place.
+    #[inline]
+    pub fn ray(&self, from: &Place, direction: DVec3, length: f64) -> Ray {
+        let origin = from.point + self.offset * from.normal;
+        Ray { origin: origin.as_vec3(), direction: direction.as_vec3(), t_max: length as f32, skip: from.triangle }
+    }
+
+    /// What a ray meets first.
+    #[inline]
+    pub fn first(&self, ray: &Ray, salt: u32) -> Option<Met> {
+        let hit = if self.is_plain {
+            self.common.closest(ray)
+        } else {
+            self.common.closest_where(ray, |t, u, v, _| {
+                !self.is_away[self.body_of[t as usize] as usize] && self.stops(t, u, v, salt)
+            })
+        };
+        let mut first = hit.map(|hit| self.met(&self.common, &hit, 0));
+        for &body in &self.apart {
+            if let Some(met) = self.first_of(body as usize, ray, salt, first.map_or(ray.t_max, |met| met.key))
+                && first.is_none_or(|best| (met.key, met.triangle) < (best.key, best.triangle))
+            {
+                first = Some(met);
+            }
+        }
+        first
+    }
+
+    /// What a ray meets first of an object with a tree of its own, if its key is no more than `key`.
+    #[inline]
+    pub fn first_of(&self, body: usize, ray: &Ray, salt: u32, key: f32) -> Option<Met> {
+        let own = &self.bodies[body];
+        let tree = own.tree.as_ref()?;
+        let first = own.first_triangle;
+        let ray = Ray { t_max: ray.t_max.min(key.next_up()), skip: ray.skip.wrapping_sub(first), ..*ray };
+        let hit = if own.shape.is_see_through {
+            tree.closest_where(&ray, |t, u, v, _| self.stops(first + t, u, v, salt))
+        } else {
+            tree.closest(&ray)
+        };
+        hit.map(|hit| self.met(tree, &hit, first)).filter(|met| met.key <= key)
+    }
+
+    fn met(&self, tree: &Tree, hit: &Hit, first: u32) -> Met {
+        Met { key: tree.key(hit), triangle: first + hit.triangle, uv: [hit.u, hit.v], back: hit.back }
+    }
+
+    /// Whether anything stops a ray before its end.
+    #[inline]
+    pub fn blocked(&self, ray: &Ray, salt: u32) -> bool {
+        let common = if self.is_plain {
+            self.common.blocked(ray)
+        } else {
+            self.common.blocked_where(ray, |t, u, v, _| {
+                !self.is_away[self.body_of[t as usize] as usize] && self.stops(t, u, v, salt)
+            })
+        };
+        common || self.apart.iter().any(|body| self.blocked_by(*body as usize, ray, salt))
+    }
+
+    /// Whether an object with a tree of its own stops a ray before its end.
+    #[inline]
+    pub fn blocked_by(&self, body: usize, ray: &Ray, salt: u32) -> bool {
+        let own = &self.bodies[body];
+        let Some(tree) = &own.tree else { return false };
+        let first = own.first_triangle;
+        let ray = Ray { skip: ray.skip.wrapping_sub(first), ..*ray };
+        if own.shape.is_see_through {
+            tree.blocked_where(&ray, |t, u, v, _| self.stops(first + t, u, v, salt))
+        } else {
+            tree.blocked(&ray)
+        }
+    }
+
+    /// The id of what was met.
+    #[inline]
+    pub fn id(&self, met: Option<Met>, direction: DVec3) -> u32 {
+        let Some(met) = met else { return self.sky.at(direction) as u32 };
+        let body = &self.bodies[self.body_of(met.triangle)];
+        let element = body.shape.at(met.triangle - body.first_triangle, met.uv[0], met.uv[1], met.back);
+        body.first + element.unwrap_or(body.len())
+    }
+
+    /// Whether a surface stops a ray, as the picture on it and chance have it.
+    fn stops(&self, triangle: u32, u: f32, v: f32, salt: u32) -> bool {
+        let body = &self.bodies[self.body_of(triangle)];
+        if !body.shape.is_see_through {
+            return true;
+        }
+        let at = Surface {
+            triangle: body.shape.triangles.start + (triangle - body.first_triangle) as usize,
+            uv: DVec2::new(f64::from(u), f64::from(v)),
+        };
+        let opacity = self.scene.opacity(at);
+        opacity >= 1.0 || (opacity > 0.0 && unit(hash(salt ^ hash(triangle))) < opacity)
+    }
+}
+
+fn single(corners: &[[DVec3; 3]]) -> Vec<[Vec3; 3]> {
+    corners.iter().map(|c| c.map(|p| p.as_vec3())).collect()
+}
