@@ -143,10 +143,12 @@ impl Session {
         shown.iter().map(|h| [h.0[0], h.0[1], h.0[2]]).collect()
     }
 
-    /// Area of each element of an object, m².
-    pub fn areas(&self, object: ObjectId) -> Vec<f64> {
+    /// The area of each element of an object that is not buried in other objects, m², as far as rays have shown.
+    pub fn exposed_areas(&self, object: ObjectId) -> Vec<f64> {
         let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
-        (0..body.len()).map(|element| body.area(element)).collect()
+        let chunks = self.chunks_of(object.0 as usize).iter();
+        let elements = chunks.flat_map(|chunk| (0..chunk.len).map(move |e| (chunk.first + e as u32, chunk.exposed(e))));
+        elements.map(|(element, share)| body.area(element) * f64::from(share)).collect()
     }
 
     fn chunks_of(&self, body: usize) -> &[Chunk] {

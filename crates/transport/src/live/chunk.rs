@@ -12,6 +12,7 @@ use super::strata::{Cells, Strata};
 use super::world::World;
 use glam::DVec3;
 use radiosity_scene::Bands;
+use radiosity_scene::elements::triangle_from_square;
 use radiosity_trace::Ray;
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
 
@@ -28,8 +29,9 @@ pub const NEAR_SHADOWS: u32 = 8;
 /// The stream of sample points that rows use.
 const ROWS: u32 = 0x0100;
 
-/// Places on an element are told apart by so many cells along each side where some are buried.
-const PLACES: usize = 4;
+/// Rays next to one that tell whether it starts inside a solid. More blur the outline of what is buried, fewer take
+/// chance for it.
+const NEIGHBOURS: usize = 8;
 
 /// Elements of which less than this part is exposed get no light.
 const LEAST_OPEN: f32 = 1.0 / 16.0;
@@ -493,6 +495,11 @@ impl Chunk {
         self.open[e] == 0.0
     }
 
+    /// The part of an element that is exposed, 0 to 1.
+    pub fn exposed(&self, e: usize) -> f32 {
+        if self.is_buried(e) { 0.0 } else { 1.0 / self.open[e] }
+    }
+
     /// What a column brings directly to an element, lux per band.
     #[inline]
     pub fn light(&self, column: usize, e: usize) -> Bands {
@@ -547,18 +554,40 @@ fn bring(work: &Work, column: usize, (site, seed): (&Site, u32), n: u32, clear: 
     sum.map(|s| (s / f64::from(n.max(1))) as f32)
 }
 
-/// How many rays of a row start from the exposed part of the element, and how large that part is. A part all of whose
-/// rays meet black backs lies in a solid: nobody sees it, so it does not count. Single backs do; they are black.
+/// How many rays of a row start from the exposed part of the element, and how large that part is. A ray that meets a black
+/// back counts as one that starts inside a solid where half of those that start next to it do so too: nobody sees that
+/// place. Elsewhere backs are black.
 fn exposed(row: &[u32], sequence: &Sequence, is_dark: &[bool]) -> (u32, f32) {
-    let mut rays = [0u32; PLACES * PLACES];
-    let mut seen = [false; PLACES * PLACES];
-    for (m, id) in row.iter().enumerate() {
-        let [_, _, x, y] = sequence.point(m as u32);
-        let cell = |x: f32| ((x * PLACES as f32) as usize).min(PLACES - 1);
-        let place = cell(y) * PLACES + cell(x);
-        rays[place] += 1;
-        seen[place] |= !is_dark[*id as usize];
+    let places: Vec<(f32, f32, bool)> = row
+        .iter()
+        .enumerate()
+        .map(|(m, id)| {
+            let [_, _, x, y] = sequence.point(m as u32);
+            let (u, v) = triangle_from_square(f64::from(x), f64::from(y));
+            (u as f32, v as f32, is_dark[*id as usize])
+        })
+        .collect();
+    let mut buried = 0;
+    for (m, (u, v, _)) in places.iter().enumerate().filter(|(_, place)| place.2) {
+        // The nearest so far, the furthest of them last.
+        let mut nearest = [(f32::INFINITY, false); NEIGHBOURS];
+        for (_, (other_u, other_v, dark)) in places.iter().enumerate().filter(|(other, _)| *other != m) {
+            // The square of the distance on an equilateral triangle.
+            let (du, dv) = (other_u - u, other_v - v);
+            let square = du * du + dv * dv + du * dv;
+            if square < nearest[NEIGHBOURS - 1].0 {
+                let mut k = NEIGHBOURS - 1;
+                while k > 0 && square < nearest[k - 1].0 {
+                    nearest[k] = nearest[k - 1];
+                    k -= 1;
+                }
+                nearest[k] = (square, *dark);
+            }
+        }
+        let dark = nearest.iter().filter(|(_, dark)| *dark).count();
+        let all = nearest.iter().filter(|(square, _)| square.is_finite()).count();
+        buried += u32::from(2 * dark >= all);
     }
-    let kept: u32 = rays.iter().zip(seen).filter(|(_, seen)| *seen).map(|(rays, _)| rays).sum();
+    let kept = row.len() as u32 - buried;
     (kept, kept as f32 / row.len().max(1) as f32)
 }
