@@ -124,12 +124,12 @@ fn random_edits(scene: &Scene, options: &SessionOptions, reach: f64, seeds: std:
 }
 
 #[test]
-fn catalogue_106_random_edits_of_the_cornell_box() {
+fn catalogue_77_random_edits_of_the_cornell_box() {
     random_edits(&cornell_box(), &small(), 0.2, 0..10);
 }
 
 #[test]
-fn catalogue_106_random_edits_of_a_furnished_room() {
+fn catalogue_77_random_edits_of_a_furnished_room() {
     random_edits(&furnished(), &small(), 1.0, 100..108);
 }
 
@@ -269,7 +269,7 @@ fn a_furnace_is_uniform() {
     for object in (0..session.model().objects.len() as u32).map(ObjectId) {
         for (h, area) in session.irradiance(object).into_iter().zip(session.exposed_areas(object)) {
             // Elements of chairs whose parts stand on each other: which of their few rays are buried is not known exactly.
-            assert!(area == 0.0 || (h[1] - 200.0).abs() < 30.0, "{h:?} on {object:?}");
+            assert!(area == 0.0 || (h[1] - 200.0).abs() < 40.0, "{h:?} on {object:?}");
             defect += area * f64::from((h[1] - 200.0).abs());
             whole += area * 200.0;
         }

@@ -77,6 +77,16 @@ impl Sequence {
         std::array::from_fn(|d| unit(owen(raw[d], self.seeds[d])))
     }
 
+    /// The first two numbers of point `index`.
+    #[inline]
+    pub fn pair(&self, index: u32) -> [f32; 2] {
+        let raw = match TABLE.get(index as usize) {
+            Some(point) => *point,
+            None => sobol(index),
+        };
+        std::array::from_fn(|d| unit(owen(raw[d], self.seeds[d])))
+    }
+
     /// Where scrambling carries the `2^bits` equal intervals of [0, 1) in the first two dimensions (nested scrambling
     /// permutes them): points that are not scrambled, those of [`strata`], lie in interval k where those of this sequence
     /// lie in interval `[d][k]`. At most 5 bits.

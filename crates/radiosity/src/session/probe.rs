@@ -284,7 +284,7 @@ impl Session {
         if rays > 0 && self.state.given.len() == self.live.ids() && !self.state.is_edited {
             let (row, share) = chunk.row(element, rays);
             let emission = self.emission();
-            for (m, other) in row.iter().enumerate() {
+            for (m, other) in row.into_iter().flatten().enumerate() {
                 let given = self.state.given[*other as usize].0;
                 let emitted = emission[*other as usize].0;
                 error[usize::from(2 * m >= rays)] += share * luminance([given[0], given[1], given[2]]);

@@ -15,6 +15,7 @@ use radiosity_scene::Bands;
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_trace::Ray;
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
+use smallvec::SmallVec;
 
 /// Elements of a chunk: a millisecond of work for a few rays each.
 pub const CHUNK: u32 = 64;
@@ -24,14 +25,17 @@ pub const CHUNK: u32 = 64;
 pub const NEAR_RAYS: u32 = 64;
 
 /// The same for shadow rays.
-pub const NEAR_SHADOWS: u32 = 8;
+pub const NEAR_SHADOWS: u32 = 4;
 
 /// The stream of sample points that rows use.
 const ROWS: u32 = 0x0100;
 
 /// Rays next to one that tell whether it starts inside a solid. More blur the outline of what is buried, fewer take
 /// chance for it.
-const NEIGHBOURS: usize = 8;
+const NEIGHBOURS: usize = 4;
+
+/// Slack for cosines of angles: that of ray directions in single precision.
+const ROUNDING: f64 = 1e-6;
 
 /// Elements of which less than this part is exposed get no light.
 const LEAST_OPEN: f32 = 1.0 / 16.0;
@@ -98,10 +102,14 @@ pub struct Chunk {
     pub id: usize,
     /// How many.
     pub len: usize,
+    /// Where they lie.
+    sites: Vec<Site>,
+    /// A ball around them.
+    ball: (DVec3, f64),
     /// Rays of each row so far.
     traced: u32,
-    /// Room for each row.
-    stride: usize,
+    /// Room for the first part of each row, and for the rest. First parts lie together, as they are often read alone.
+    room: [usize; 2],
     ids: Vec<u32>,
     keys: Vec<f32>,
     /// One over the rays that count, of the first part and of all, by element.
@@ -172,13 +180,17 @@ impl Chunk {
     /// Elements `first..first + len` of an object, for rows of `stride` rays at most.
     pub fn new(world: &World, body: usize, first: u32, len: u32, stride: u32, columns: usize) -> Chunk {
         let n = len as usize;
+        let near = stride.min(NEAR_RAYS);
+        let room = [near as usize, (stride - near) as usize];
         let mut chunk = Chunk {
             body,
             first,
             id: (world.bodies[body].first + first) as usize,
             len: n,
+            sites: Vec::new(),
+            ball: (DVec3::ZERO, 0.0),
             traced: 0,
-            stride: stride as usize,
+            room,
             ids: vec![0; n * stride as usize],
             keys: vec![0.0; n * stride as usize],
             scale: [vec![0.0; n], vec![0.0; n]],
@@ -187,7 +199,17 @@ impl Chunk {
             seen: [0; 2],
         };
         chunk.make_columns(columns);
+        chunk.find_sites(world);
         chunk
+    }
+
+    fn find_sites(&mut self, world: &World) {
+        let body = &world.bodies[self.body];
+        self.sites = (0..self.len as u32).map(|e| body.site(self.first + e, world.offset)).collect();
+        let n = self.len as f64;
+        let centre = self.sites.iter().map(|site| site.centre).sum::<DVec3>() / n;
+        let reach = |site: &Site| site.centre.distance(centre) + site.radius;
+        self.ball = (centre, self.sites.iter().map(reach).fold(0.0, f64::max));
     }
 
     /// Bytes of an element with rows of `rays` rays and so many columns.
@@ -195,6 +217,7 @@ impl Chunk {
         rays as usize * (size_of::<u32>() + size_of::<f32>())
             + columns * (size_of::<u64>() + size_of::<Bands>())
             + 3 * size_of::<f32>()
+            + size_of::<Site>()
     }
 
     /// Makes room for more columns.
@@ -209,8 +232,9 @@ impl Chunk {
     }
 
     /// Forgets all rays: the object is elsewhere.
-    pub fn forget(&mut self) {
+    pub fn forget(&mut self, world: &World) {
         self.traced = 0;
+        self.find_sites(world);
         (0..self.shadows.len()).for_each(|column| self.forget_column(column));
     }
 
@@ -304,9 +328,7 @@ impl Chunk {
     }
 
     fn site(&self, world: &World, e: usize) -> (Site, u32) {
-        let body = &world.bodies[self.body];
-        let element = self.first + e as u32;
-        (body.site(element, world.offset), hash(body.key ^ hash(element)))
+        (self.sites[e], hash(world.bodies[self.body].key ^ hash(self.first + e as u32)))
     }
 
     fn trace_row(&mut self, world: &World, e: usize, range: std::ops::Range<u32>) {
@@ -315,7 +337,7 @@ impl Chunk {
         for m in range {
             let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
             let met = world.first(&ray, salt);
-            let at = e * self.stride + m as usize;
+            let at = self.at(e, m);
             self.ids[at] = world.id(met, direction);
             self.keys[at] = met.map_or(f32::INFINITY, |met| met.key);
         }
@@ -323,17 +345,17 @@ impl Chunk {
 
     /// Works out what rays of a row count, after some were traced.
     fn weigh(&mut self, work: &Work, e: usize) {
-        let row = &self.ids[e * self.stride..][..self.traced as usize];
-        let near = row.len().min(NEAR_RAYS as usize);
-        if row.iter().all(|id| !work.is_dark[*id as usize]) {
+        let (rays, near) = (self.traced as usize, self.traced.min(NEAR_RAYS) as usize);
+        if self.parts(e, rays).into_iter().flatten().all(|id| !work.is_dark[*id as usize]) {
             self.scale[0][e] = 1.0 / near as f32;
-            self.scale[1][e] = 1.0 / row.len() as f32;
+            self.scale[1][e] = 1.0 / rays as f32;
             self.open[e] = 1.0;
             return;
         }
         let (_, seed) = self.site(work.world, e);
         let sequence = Sequence::new(seed, ROWS);
-        for (scale, n) in [(0, near), (1, row.len())] {
+        let row = self.parts(e, rays).concat();
+        for (scale, n) in [(0, near), (1, rays)] {
             let (kept, open) = exposed(&row[..n], &sequence, work.is_dark);
             self.scale[scale][e] = if open >= LEAST_OPEN { 1.0 / kept as f32 } else { 0.0 };
             self.open[e] = if open >= LEAST_OPEN { 1.0 / open } else { 0.0 };
@@ -347,6 +369,8 @@ impl Chunk {
         let frame = frame(site.normal);
         let strata = &work.strata[part as usize];
         let mut cells = Cells::default();
+        // Directions and cosines of the cones about the balls.
+        let mut cones: SmallVec<[(DVec3, f64); 4]> = SmallVec::new();
         for (centre, radius) in &dirt.balls {
             let along = *centre - site.centre;
             let reach = radius + site.radius;
@@ -356,11 +380,14 @@ impl Chunk {
             let distance = along.length();
             if distance <= 1.001 * reach {
                 cells = Cells::ALL;
+                cones.push((site.normal, -2.0));
                 break;
             }
             let sine = reach / distance;
+            let cosine = (1.0 - sine * sine).sqrt();
             let direction = DVec3::from_array(frame.map(|axis| axis.dot(along) / distance));
-            strata.towards(direction, ((1.0 - sine * sine).sqrt(), sine), &mut cells);
+            strata.towards(direction, (cosine, sine), &mut cells);
+            cones.push((along / distance, cosine - ROUNDING));
         }
         if cells.is_empty() {
             return 0;
@@ -372,7 +399,12 @@ impl Chunk {
             if !known.contains(&m) {
                 return;
             }
-            let at = e * self.stride + m as usize;
+            let [u, v] = sequence.pair(m);
+            let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+            if cones.iter().all(|(axis, cosine)| axis.dot(direction) < *cosine) {
+                return;
+            }
+            let at = self.at(e, m);
             let (id, key) = (self.ids[at], self.keys[at]);
             let mut is_lost = dirt.bodies.iter().any(|dirty| dirty.own.has(id));
             if !is_lost && dirt.now.is_empty() {
@@ -426,10 +458,13 @@ impl Chunk {
             Part::Far => NEAR_SHADOWS.min(known)..known,
         };
         let (world, margin) = (work.world, 4.0 * work.world.offset);
+        if !dirt.balls.iter().any(|ball| light.may_meet(self.ball, *ball)) {
+            return 0;
+        }
         let mut rays = 0;
         for e in 0..self.len {
             let (site, seed) = self.site(world, e);
-            if !dirt.balls.iter().any(|ball| light.may_meet(&site, *ball)) {
+            if !dirt.balls.iter().any(|ball| light.may_meet((site.centre, site.radius), *ball)) {
                 continue;
             }
             let sequence = light.sequence(seed);
@@ -506,24 +541,37 @@ impl Chunk {
         self.shadows[column].light[e].map(|x| x * self.open[e])
     }
 
-    /// The ids of the first `rays` entries of a row, and what each entry weighs.
+    /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs.
     #[inline]
-    pub fn row(&self, e: usize, rays: usize) -> (&[u32], f32) {
+    pub fn row(&self, e: usize, rays: usize) -> ([&[u32]; 2], f32) {
         let part = usize::from(rays > NEAR_RAYS as usize);
-        (&self.ids[e * self.stride..][..rays], self.scale[part][e])
+        (self.parts(e, rays), self.scale[part][e])
+    }
+
+    #[inline]
+    fn parts(&self, e: usize, rays: usize) -> [&[u32]; 2] {
+        let [near, far] = self.room;
+        let first = rays.min(near);
+        [&self.ids[e * near..][..first], &self.ids[self.len * near + e * far..][..rays - first]]
+    }
+
+    /// Where entry m of a row is kept.
+    #[inline]
+    fn at(&self, e: usize, m: u32) -> usize {
+        let ([near, far], m) = (self.room, m as usize);
+        if m < near { e * near + m } else { self.len * near + e * far + m - near }
     }
 
     /// The rays of a row: origin and end about the middle of the scene, `far` where they escape.
     pub fn rays(&self, world: &World, e: usize, far: f64) -> Vec<[DVec3; 2]> {
         let (site, seed) = self.site(world, e);
         let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
-        let keys = &self.keys[e * self.stride..][..self.traced as usize];
-        let ray = |(m, key): (usize, &f32)| {
-            let (ray, direction, _) = shoot(world, &site, (&sequence, seed), &frame, m as u32);
-            let origin = ray.origin.as_dvec3();
-            [origin, origin + direction * if key.is_finite() { f64::from(*key) } else { far }]
+        let ray = |m: u32| {
+            let (ray, direction, _) = shoot(world, &site, (&sequence, seed), &frame, m);
+            let (origin, key) = (ray.origin.as_dvec3(), self.keys[self.at(e, m)]);
+            [origin, origin + direction * if key.is_finite() { f64::from(key) } else { far }]
         };
-        keys.iter().enumerate().map(ray).collect()
+        (0..self.traced).map(ray).collect()
     }
 }
 

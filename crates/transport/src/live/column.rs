@@ -144,13 +144,23 @@ impl Column {
         Sequence::new(seed, SHADOW ^ hash(self.key))
     }
 
-    /// Whether shadow rays of an element may meet a ball; never wrong where it says no.
-    pub fn may_meet(&self, site: &Site, (centre, radius): (DVec3, f64)) -> bool {
+    /// Whether shadow rays from a ball may meet another; never wrong where it says no.
+    pub fn may_meet(&self, (from, start): (DVec3, f64), (centre, radius): (DVec3, f64)) -> bool {
         let Some((light, own)) = self.ball else { return true };
-        let along = light - site.centre;
-        let square = along.length_squared();
-        let share = if square > 0.0 { ((centre - site.centre).dot(along) / square).clamp(0.0, 1.0) } else { 0.0 };
-        (site.centre + share * along).distance(centre) <= 1.001 * (radius + own.max(site.radius))
+        let along = light - from;
+        let length = along.length();
+        // The hull of two balls is a ball that grows from one to the other; where it comes nearest to a point lies a little
+        // further towards the larger end than the point's foot on the axis.
+        let slope = (own - start) / length;
+        if !(slope.abs() < 1.0) {
+            return true;
+        }
+        let away = centre - from;
+        let foot = away.dot(along) / length;
+        let height = (away.length_squared() - foot * foot).max(0.0).sqrt();
+        let share = ((foot + height * slope / (1.0 - slope * slope).sqrt()) / length).clamp(0.0, 1.0);
+        let width = start + share * (own - start);
+        (from + share * along).distance(centre) <= 1.001 * (radius + width)
     }
 
     /// Shadow ray `index` of an element; none where nothing can arrive.

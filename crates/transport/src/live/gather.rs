@@ -19,18 +19,22 @@ impl Live {
     /// The mean of `values` over the first `rays` entries of each row; nothing for objects that are not there, for the sky
     /// and for black backs. Values and means are by id.
     pub fn gather<const W: usize>(&self, values: &[Lanes<W>], rays: usize, means: &mut [Lanes<W>]) {
+        assert!(rays.is_multiple_of(4), "{rays}");
         assert_eq!((values.len(), means.len()), (self.ids(), self.ids()));
         self.each_chunk(means, |chunk, means| {
             for (e, mean) in means.iter_mut().enumerate() {
                 let (row, share) = chunk.row(e, rays);
-                let mut sum = [0f32; W];
-                for id in row {
-                    let value = &values[*id as usize].0;
-                    for k in 0..W {
-                        sum[k] += value[k];
+                // Four sums side by side: each addition would wait for the one before it.
+                let mut sums = [[0f32; W]; 4];
+                for ids in row.into_iter().flat_map(|part| part.chunks_exact(4)) {
+                    for (sum, id) in sums.iter_mut().zip(ids) {
+                        let value = &values[*id as usize].0;
+                        for k in 0..W {
+                            sum[k] += value[k];
+                        }
                     }
                 }
-                *mean = Lanes(sum.map(|s| s * share));
+                *mean = Lanes(std::array::from_fn(|k| ((sums[0][k] + sums[1][k]) + (sums[2][k] + sums[3][k])) * share));
             }
         });
     }
@@ -41,12 +45,10 @@ impl Live {
             for (e, difference) in differences.iter_mut().enumerate() {
                 let (row, share) = chunk.row(e, rays);
                 let mut sums = [[0f32; 4]; 2];
-                for (sum, ids) in sums.iter_mut().zip(row.chunks_exact((row.len() / 2).max(1))) {
-                    for id in ids {
-                        let value = &values[*id as usize].0;
-                        for k in 0..4 {
-                            sum[k] += value[k];
-                        }
+                for (m, id) in row.into_iter().flatten().enumerate() {
+                    let (sum, value) = (&mut sums[usize::from(2 * m >= rays)], &values[*id as usize].0);
+                    for k in 0..4 {
+                        sum[k] += value[k];
                     }
                 }
                 *difference = Lanes(std::array::from_fn(|k| (sums[0][k] - sums[1][k]) * share));

@@ -147,7 +147,8 @@ impl Live {
     }
 
     fn forget(&mut self, body: usize) {
-        self.chunks.iter_mut().filter(|chunk| chunk.body == body).for_each(Chunk::forget);
+        let world = &self.world;
+        self.chunks.iter_mut().filter(|chunk| chunk.body == body).for_each(|chunk| chunk.forget(world));
     }
 
     /// Puts an object elsewhere, or brings it back.
