@@ -84,7 +84,7 @@ impl Session {
                 let source = there(*object, known)?;
                 self.check_place(*object, source, matrix)?;
                 let body = &self.live.world().bodies[source];
-                known.elements += body.len() as usize + 1;
+                known.elements += body.elements() as usize + 1;
                 known.lights += usize::from(self.objects[source].light.is_some());
                 known.present.push(true);
                 known.source.push(source);
@@ -247,12 +247,9 @@ impl Session {
             let mut material = from.materials[object.material].clone();
             let is_as_it_was = material.clone();
             if let Some(coat) = placed.coat {
-                for band in 0..3 {
-                    let base = &mut material.base_color[band];
-                    *base = match placed.paint.mean[band] {
-                        mean if placed.paint.is_varied && mean > 0.0 => (*base * (coat[band] / mean)).min(1.0),
-                        _ => coat[band],
-                    };
+                for ((base, coat), mean) in material.base_color.iter_mut().zip(coat).zip(placed.paint.mean) {
+                    let keeps_pattern = placed.paint.is_varied && mean > 0.0;
+                    *base = if keeps_pattern { (*base * (coat / mean)).min(1.0) } else { coat };
                 }
                 if !placed.paint.is_varied {
                     material.metallic = 0.0;
@@ -323,7 +320,7 @@ fn check_matrix(matrix: &[f64; 16]) -> Result<DAffine3, EditError> {
     // No column may vanish beside the others either: a plate of no thickness has no normals.
     let lengths = [placed.matrix3.x_axis, placed.matrix3.y_axis, placed.matrix3.z_axis].map(DVec3::length);
     let volume: f64 = lengths.iter().product();
-    let is_flat = !(determinant > 1e-6 * volume);
+    let is_flat = determinant.is_nan() || determinant <= 1e-6 * volume;
     if is_flat || !(1.0 / MOST_SCALE..=MOST_SCALE).contains(&determinant) {
         return Err(EditError::Determinant(determinant));
     }

@@ -127,8 +127,11 @@ pub struct Session {
     state: State,
     memory: usize,
     /// The layer that was asked for last, by id.
-    cache: Mutex<Option<(Layer, u64, Arc<Vec<Lanes<4>>>)>>,
+    cache: Mutex<Option<Kept>>,
 }
+
+/// A layer by id, and of which revision it is.
+type Kept = (Layer, u64, Arc<Vec<Lanes<4>>>);
 
 /// An object as it is now.
 #[derive(Clone)]
@@ -217,7 +220,7 @@ impl Session {
             if !body.is_present {
                 continue;
             }
-            for element in 0..body.len() {
+            for element in 0..body.elements() {
                 let id = body.first + element;
                 let (rho, tau) = placed.paint.of(element, body.shape.fronts, placed.coat);
                 self.answer.rho[id as usize] = rho;
@@ -289,7 +292,7 @@ impl Session {
     /// Where the session stands.
     pub fn status(&self) -> Status {
         let elements =
-            self.live.world().bodies.iter().filter(|body| body.is_present).map(|body| body.len()).sum::<u32>();
+            self.live.world().bodies.iter().filter(|body| body.is_present).map(|body| body.elements()).sum::<u32>();
         let most = self.live.most().rays;
         Status {
             elements: elements as usize,

@@ -58,7 +58,7 @@ impl Session {
                 normals: display.normals.clone(),
                 uvs: display.uvs.clone(),
                 indices: display.indices.clone(),
-                triangle_of: (0..body.len())
+                triangle_of: (0..body.elements())
                     .map(|element| (body.shape.triangles.start + body.shape.place(element).0) as u32)
                     .collect(),
                 reflectance: placed.coat.unwrap_or(placed.paint.mean),

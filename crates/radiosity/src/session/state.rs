@@ -426,7 +426,7 @@ impl Session {
                 }
                 Some(body) => {
                     let body = &self.live.world().bodies[body];
-                    for element in 0..body.len() {
+                    for element in 0..body.elements() {
                         let (t, _, _) = body.shape.place(element);
                         add((body.first + element) as usize, body.shape.exitance[t]);
                     }

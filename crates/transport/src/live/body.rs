@@ -172,7 +172,7 @@ impl Bounds {
         let (near, far) = (a.min(b), a.max(b));
         let enter = near.x.max(near.y).max(near.z).max(0.0);
         let leave = far.x.min(far.y).min(far.z).min(length + margin);
-        !(enter > leave)
+        enter <= leave
     }
 }
 
@@ -203,19 +203,19 @@ pub struct Body {
 
 impl Body {
     /// Number of elements.
-    pub fn len(&self) -> u32 {
+    pub fn elements(&self) -> u32 {
         self.shape.elements()
     }
 
     /// Id of its black backs.
     pub fn dark(&self) -> u32 {
-        self.first + self.len()
+        self.first + self.elements()
     }
 
     /// Whether an id is one of its own.
     #[inline]
     pub fn has(&self, id: u32) -> bool {
-        id.wrapping_sub(self.first) <= self.len()
+        id.wrapping_sub(self.first) <= self.elements()
     }
 
     /// Puts it somewhere.

@@ -152,7 +152,7 @@ impl Column {
         // The hull of two balls is a ball that grows from one to the other; where it comes nearest to a point lies a little
         // further towards the larger end than the point's foot on the axis.
         let slope = (own - start) / length;
-        if !(slope.abs() < 1.0) {
+        if slope.is_nan() || slope.abs() >= 1.0 {
             return true;
         }
         let away = centre - from;

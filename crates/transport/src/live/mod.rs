@@ -137,7 +137,7 @@ impl Live {
 
     /// Cuts an object into chunks.
     fn cut(&mut self, body: usize) {
-        let n = self.world.bodies[body].len();
+        let n = self.world.bodies[body].elements();
         for first in (0..n).step_by(CHUNK as usize) {
             let len = CHUNK.min(n - first);
             self.chunks.push(Chunk::new(&self.world, body, first, len, self.most.rays, self.columns.len()));

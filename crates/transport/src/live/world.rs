@@ -255,7 +255,7 @@ impl World {
         let Some(met) = met else { return self.sky.at(direction) as u32 };
         let body = &self.bodies[self.body_of(met.triangle)];
         let element = body.shape.at(met.triangle - body.first_triangle, met.uv[0], met.uv[1], met.back);
-        body.first + element.unwrap_or(body.len())
+        body.first + element.unwrap_or(body.elements())
     }
 
     /// Whether a surface stops a ray, as the picture on it and chance have it.
