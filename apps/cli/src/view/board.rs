@@ -1,0 +1,264 @@
+//! What there is to see, for any number of pages: the solver posts, each page takes at its own pace.
+//!
+//! A notice has a key, and only the latest of a key is kept, under a revision that grows with each post. A page that
+//! remembers the last revision it was sent is owed exactly what is newer: a new page everything, one that was slow what it
+//! missed without what was outdated meanwhile. So nobody waits for a page and no page fills the memory.
+
+use axum::body::Bytes;
+use radiosity::session::Layer;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tokio::sync::watch;
+
+/// Vertices whose light is one notice: 6 kB. Fewer, and headers weigh; more, and a change sends what did not change.
+pub const CHUNK: usize = 1024;
+
+/// What a notice is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Subject {
+    /// The scene as a whole: name, axes, cameras.
+    Scene,
+    /// Triangles of an object.
+    Mesh(u32),
+    /// An object: where it is, what it is made of.
+    Object(u32),
+    /// A light.
+    Light(u32),
+    /// Cameras that people have kept.
+    Bookmarks,
+    /// What can be undone.
+    History,
+    /// How far the solution is.
+    Status,
+}
+
+/// A notice as it goes over the wire.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Notice {
+    /// JSON.
+    Text(String),
+    /// Triangles.
+    Binary(Bytes),
+}
+
+/// Light of some vertices of one object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightChunk {
+    /// The object.
+    pub object: u32,
+    /// Its first vertex here.
+    pub first: u32,
+    /// Three half floats for each.
+    pub values: Vec<u16>,
+}
+
+/// The latest of each key, by the order of posting.
+struct Latest<K, V> {
+    posts: HashMap<K, (u64, V)>,
+    order: BTreeMap<u64, K>,
+}
+
+impl<K, V> Default for Latest<K, V> {
+    fn default() -> Self {
+        Latest { posts: HashMap::new(), order: BTreeMap::new() }
+    }
+}
+
+impl<K: Copy + Eq + std::hash::Hash, V: PartialEq> Latest<K, V> {
+    /// Whether it is news.
+    fn post(&mut self, key: K, value: V, revision: u64) -> bool {
+        if let Some((old, held)) = self.posts.get(&key) {
+            if *held == value {
+                return false;
+            }
+            self.order.remove(old);
+        }
+        self.order.insert(revision, key);
+        self.posts.insert(key, (revision, value));
+        true
+    }
+
+    fn after(&self, seen: u64) -> impl Iterator<Item = (u64, &V)> {
+        self.order.range(seen + 1..).map(|(revision, key)| (*revision, &self.posts[key].1))
+    }
+}
+
+/// Light of one layer and how many pages look at it.
+#[derive(Default)]
+struct Watched {
+    pages: usize,
+    light: Latest<(u32, u32), LightChunk>,
+}
+
+#[derive(Default)]
+struct Posts {
+    revision: u64,
+    notices: Latest<Subject, Notice>,
+    layers: Vec<(Layer, Watched)>,
+}
+
+/// What a page was sent.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    notices: u64,
+    light: u64,
+}
+
+impl Seen {
+    /// Another layer is looked at: none of its light was sent.
+    pub fn forget_light(&mut self) {
+        self.light = 0;
+    }
+}
+
+/// Most bytes of light in one frame.
+const FRAME: usize = 1 << 18;
+
+/// The board.
+pub struct Board {
+    posts: Mutex<Posts>,
+    news: watch::Sender<u64>,
+}
+
+impl Board {
+    /// With nothing on it.
+    pub fn new() -> Board {
+        Board { posts: Mutex::default(), news: watch::Sender::new(0) }
+    }
+
+    /// Wakes whoever waits for news.
+    pub fn subscribe(&self) -> watch::Receiver<u64> {
+        self.news.subscribe()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Posts> {
+        self.posts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Puts a notice up in place of the last one on its subject.
+    pub fn post(&self, subject: Subject, notice: Notice) {
+        let mut posts = self.lock();
+        let revision = posts.revision + 1;
+        if posts.notices.post(subject, notice, revision) {
+            posts.revision = revision;
+            drop(posts);
+            self.news.send_replace(revision);
+        }
+    }
+
+    /// Puts up the light of all vertices of an object; only chunks that differ from what hangs there are news.
+    pub fn post_light(&self, layer: Layer, object: u32, values: &[u16]) {
+        let mut posts = self.lock();
+        let mut revision = posts.revision;
+        // A layer that nobody looks at any more is not kept.
+        let Some((_, watched)) = posts.layers.iter_mut().find(|(of, _)| *of == layer) else { return };
+        for (chunk, values) in values.chunks(3 * CHUNK).enumerate() {
+            let chunk = chunk as u32;
+            let light = LightChunk { object, first: chunk * CHUNK as u32, values: values.to_vec() };
+            if watched.light.post((object, chunk), light, revision + 1) {
+                revision += 1;
+            }
+        }
+        if revision > posts.revision {
+            posts.revision = revision;
+            drop(posts);
+            self.news.send_replace(revision);
+        }
+    }
+
+    /// A page looks at a layer from now on.
+    pub fn watch(&self, layer: Layer) {
+        let mut posts = self.lock();
+        match posts.layers.iter_mut().find(|(of, _)| *of == layer) {
+            Some((_, watched)) => watched.pages += 1,
+            None => posts.layers.push((layer, Watched { pages: 1, light: Latest::default() })),
+        }
+    }
+
+    /// A page does so no longer.
+    pub fn unwatch(&self, layer: Layer) {
+        let mut posts = self.lock();
+        if let Some((_, watched)) = posts.layers.iter_mut().find(|(of, _)| *of == layer) {
+            watched.pages -= 1;
+        }
+        posts.layers.retain(|(_, watched)| watched.pages > 0);
+    }
+
+    /// Layers that pages look at.
+    pub fn layers(&self) -> Vec<Layer> {
+        self.lock().layers.iter().map(|(layer, _)| *layer).collect()
+    }
+
+    /// The next notice that a page has not seen.
+    pub fn next_notice(&self, seen: &mut Seen) -> Option<Notice> {
+        let posts = self.lock();
+        let (revision, notice) = posts.notices.after(seen.notices).next()?;
+        seen.notices = revision;
+        Some(notice.clone())
+    }
+
+    /// The next light of a layer that a page has not seen, about a frame of it.
+    pub fn next_light(&self, layer: Layer, seen: &mut Seen) -> Vec<LightChunk> {
+        let posts = self.lock();
+        let Some((_, watched)) = posts.layers.iter().find(|(of, _)| *of == layer) else { return Vec::new() };
+        let (mut chunks, mut bytes) = (Vec::new(), 0);
+        for (revision, chunk) in watched.light.after(seen.light) {
+            seen.light = revision;
+            bytes += 2 * chunk.values.len();
+            chunks.push(chunk.clone());
+            if bytes >= FRAME {
+                break;
+            }
+        }
+        chunks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(board: &Board, seen: &mut Seen) -> Option<String> {
+        board.next_notice(seen).map(|notice| match notice {
+            Notice::Text(text) => text,
+            Notice::Binary(_) => panic!("text was posted"),
+        })
+    }
+
+    #[test]
+    fn a_slow_page_gets_the_latest_and_a_new_one_everything() {
+        let board = Board::new();
+        let (mut quick, mut slow) = (Seen::default(), Seen::default());
+        board.post(Subject::Scene, Notice::Text("scene".into()));
+        assert_eq!(text(&board, &mut quick).as_deref(), Some("scene"));
+        for step in 0..1000 {
+            board.post(Subject::Status, Notice::Text(step.to_string()));
+        }
+        board.post(Subject::Status, Notice::Text("999".into()));
+        assert_eq!(text(&board, &mut quick).as_deref(), Some("999"));
+        assert_eq!(text(&board, &mut quick), None);
+        assert_eq!(text(&board, &mut slow).as_deref(), Some("scene"));
+        assert_eq!(text(&board, &mut slow).as_deref(), Some("999"));
+        assert_eq!(text(&board, &mut slow), None);
+    }
+
+    #[test]
+    fn only_chunks_that_changed_are_news() {
+        let board = Board::new();
+        let layer = Layer::Total;
+        board.post_light(layer, 1, &[1; 30]);
+        assert_eq!(board.next_light(layer, &mut Seen::default()), [], "nobody looked");
+        board.watch(layer);
+        let mut values = vec![1u16; 3 * (2 * CHUNK + 10)];
+        board.post_light(layer, 7, &values);
+        let mut seen = Seen::default();
+        assert_eq!(board.next_light(layer, &mut seen).len(), 3);
+        values[3 * CHUNK + 5] = 2;
+        board.post_light(layer, 7, &values);
+        let news = board.next_light(layer, &mut seen);
+        assert_eq!(news.len(), 1);
+        assert_eq!((news[0].object, news[0].first), (7, CHUNK as u32));
+        board.unwatch(layer);
+        assert!(board.layers().is_empty());
+    }
+}

@@ -1,0 +1,150 @@
+//! What can be undone, by whichever page it was done.
+
+use radiosity::session::{Edit, LightId, Model, ObjectId};
+
+/// Most changes that are remembered.
+const LONGEST: usize = 1000;
+
+/// A gesture of a page: edits of one are undone together.
+pub type Gesture = (u64, u64);
+
+/// A change that was made.
+struct Change {
+    /// What people call it.
+    label: String,
+    /// The edit that takes it back, or does it again.
+    edit: Edit,
+    gesture: Option<Gesture>,
+}
+
+/// Changes that can be undone, and those that can be done again.
+#[derive(Default)]
+pub struct History {
+    done: Vec<Change>,
+    undone: Vec<Change>,
+}
+
+impl History {
+    /// A change was made; `inverse` takes it back.
+    pub fn did(&mut self, label: String, inverse: Edit, gesture: Option<Gesture>) {
+        self.undone.clear();
+        let goes_on = |last: &Change| last.gesture.is_some() && last.gesture == gesture;
+        if let Some(last) = self.done.last().filter(|last| goes_on(last)) {
+            // The first inverse leads back to before the gesture.
+            if targets(&last.edit) == targets(&inverse) {
+                return;
+            }
+        }
+        if self.done.len() == LONGEST {
+            self.done.remove(0);
+        }
+        self.done.push(Change { label, edit: inverse, gesture });
+    }
+
+    /// The edit that takes the last change back.
+    pub fn next_undo(&self) -> Option<&Edit> {
+        self.done.last().map(|change| &change.edit)
+    }
+
+    /// The edit that makes the last undone change again.
+    pub fn next_redo(&self) -> Option<&Edit> {
+        self.undone.last().map(|change| &change.edit)
+    }
+
+    /// The last change was taken back; `inverse` makes it again.
+    pub fn undid(&mut self, inverse: Edit) {
+        if let Some(change) = self.done.pop() {
+            self.undone.push(Change { edit: inverse, gesture: None, ..change });
+        }
+    }
+
+    /// The last undone change was made again.
+    pub fn redid(&mut self, inverse: Edit) {
+        if let Some(change) = self.undone.pop() {
+            self.done.push(Change { edit: inverse, gesture: None, ..change });
+        }
+    }
+
+    /// What would be undone and done again.
+    pub fn labels(&self) -> [Option<&str>; 2] {
+        [&self.done, &self.undone].map(|changes| changes.last().map(|change| change.label.as_str()))
+    }
+}
+
+/// What an edit acts on.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Target {
+    Paint(ObjectId),
+    Place(ObjectId),
+    Presence(ObjectId),
+    Light(LightId),
+    LightPlace(LightId),
+}
+
+/// Everything that an edit acts on, in order.
+pub fn targets(edit: &Edit) -> Vec<Target> {
+    match edit {
+        Edit::Light { light, .. } => vec![Target::Light(*light)],
+        Edit::MoveLight { light, .. } => vec![Target::LightPlace(*light)],
+        Edit::Reflectance { object, .. } => vec![Target::Paint(*object)],
+        Edit::Move { object, .. } => vec![Target::Place(*object)],
+        Edit::Copy { object, .. } | Edit::Delete { object } | Edit::Restore { object } => vec![Target::Presence(*object)],
+        Edit::Several(edits) => edits.iter().flat_map(targets).collect(),
+    }
+}
+
+/// What people call an edit.
+pub fn label(edit: &Edit, model: &Model) -> String {
+    let object = |id: &ObjectId| {
+        let named = model.objects.iter().find(|object| object.id == *id).map(|object| object.name.as_str());
+        named.filter(|name| !name.is_empty()).map_or_else(|| format!("object {}", id.0 + 1), str::to_owned)
+    };
+    let light = |id: &LightId| {
+        let named = model.lights.iter().find(|light| light.id == *id).map(|light| light.name.as_str());
+        named.filter(|name| !name.is_empty()).map_or_else(|| format!("light {}", id.0 + 1), str::to_owned)
+    };
+    match edit {
+        Edit::Light { light: id, .. } => format!("dim {}", light(id)),
+        Edit::MoveLight { light: id, .. } => format!("move {}", light(id)),
+        Edit::Reflectance { object: id, .. } => format!("paint {}", object(id)),
+        Edit::Move { object: id, .. } => format!("move {}", object(id)),
+        Edit::Copy { object: id, .. } => format!("duplicate {}", object(id)),
+        Edit::Delete { object: id } => format!("delete {}", object(id)),
+        Edit::Restore { object: id } => format!("restore {}", object(id)),
+        Edit::Several(edits) => edits.first().map_or_else(String::new, |first| label(first, model)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dim(light: u32, dimming: f32) -> Edit {
+        Edit::Light { light: LightId(light), dimming, colour: [1.0; 3] }
+    }
+
+    #[test]
+    fn a_gesture_is_undone_at_once() {
+        let mut history = History::default();
+        history.did("dim a".into(), dim(0, 1.0), Some((1, 7)));
+        history.did("dim a".into(), dim(0, 0.9), Some((1, 7)));
+        history.did("dim a".into(), dim(0, 0.8), Some((2, 7)));
+        assert_eq!(history.next_undo(), Some(&dim(0, 0.8)), "another page's gesture is another");
+        history.undid(dim(0, 0.5));
+        assert_eq!(history.next_undo(), Some(&dim(0, 1.0)));
+        assert_eq!(history.labels(), [Some("dim a"), Some("dim a")]);
+        history.redid(dim(0, 0.8));
+        history.did("dim b".into(), dim(1, 1.0), None);
+        assert_eq!(history.next_redo(), None, "what was undone is gone after a new change");
+    }
+
+    #[test]
+    fn one_gesture_on_two_things_is_two_changes() {
+        let mut history = History::default();
+        history.did("dim a".into(), dim(0, 1.0), Some((1, 7)));
+        history.did("dim b".into(), dim(1, 1.0), Some((1, 7)));
+        assert_eq!(history.next_undo(), Some(&dim(1, 1.0)));
+        history.undid(dim(1, 0.0));
+        assert_eq!(history.next_undo(), Some(&dim(0, 1.0)));
+    }
+}

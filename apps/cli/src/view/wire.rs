@@ -1,0 +1,331 @@
+//! What page and server say to each other. JSON in both directions; triangles and light go out as binary frames:
+//!
+//! - triangles: `1, object, vertices, triangles, flags` as 32-bit words, then positions (three floats a vertex), texture
+//!   coordinates (two, where flag 1 is set), indices (three words a triangle);
+//! - light: `2, epoch`, then runs of `object, first, count` and three half floats for each of `count` vertices, in units of
+//!   16 lx, each run padded to whole words. The epoch is that of the page's last choice of a layer.
+//!
+//! All little-endian.
+
+use super::board::{CHUNK, LightChunk};
+use axum::body::Bytes;
+use half::f16;
+use radiosity::session::{Edit, Layer, LightId, ModelLight, ModelObject, ObjectId};
+use radiosity::{Bands, Scene, Texture, TextureRef, Wrap};
+use serde::{Deserialize, Serialize};
+use std::f32::consts::PI;
+
+/// Most bytes of a message from a page. An edit of hundreds of things at once has as many.
+pub const LONGEST: usize = 256 << 10;
+
+/// Light that a half float of 1 stands for, lx: they reach 65504, and sunlight is brighter than that.
+const UNIT: f32 = 16.0;
+
+const MESH: u32 = 1;
+const LIGHT: u32 = 2;
+const HAS_UVS: u32 = 1;
+
+/// A place to look from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraPlace {
+    /// Name for people.
+    pub name: String,
+    /// World from camera, by columns.
+    pub matrix: [f64; 16],
+    /// Vertical angle of view, radians.
+    pub fov: f64,
+}
+
+/// Everything that a page may ask for.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Request {
+    /// Changes the scene. Edits of one gesture, such as a drag, are undone together.
+    Edit {
+        edit: Edit,
+        #[serde(default)]
+        gesture: Option<u64>,
+    },
+    Undo,
+    Redo,
+    /// Looks at another layer of light.
+    Layer { layer: Layer, epoch: u32 },
+    /// Measures at a place of an object.
+    Probe { question: u64, object: ObjectId, triangle: u32, uv: [f32; 2] },
+    /// Asks for the rays of an element.
+    Rays { question: u64, object: ObjectId, triangle: u32 },
+    /// Keeps a camera, in place of one of the same name.
+    Bookmark { camera: CameraPlace },
+    /// Gives one up.
+    Forget { name: String },
+}
+
+/// Everything that the server says, but light and triangles.
+#[derive(Clone, Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Say<'a> {
+    Scene {
+        name: &'a str,
+        version: &'static str,
+        up: [f64; 3],
+        low: [f64; 3],
+        high: [f64; 3],
+        cameras: Vec<CameraPlace>,
+        sky: Option<SkyPicture>,
+    },
+    Object {
+        id: ObjectId,
+        name: &'a str,
+        group: u32,
+        matrix: [f64; 16],
+        reflectance: Bands,
+        tint: Bands,
+        texture: Option<TextureUse>,
+        /// Luminance, cd/m².
+        emission: Bands,
+        deleted: bool,
+        movable: bool,
+    },
+    Light {
+        id: LightId,
+        name: &'a str,
+        r#type: radiosity::session::LightKind,
+        dimming: f32,
+        colour: Bands,
+        matrix: [f64; 16],
+        position: Option<[f64; 3]>,
+        object: Option<ObjectId>,
+        deleted: bool,
+    },
+    Bookmarks {
+        cameras: &'a [CameraPlace],
+    },
+    History {
+        undo: Option<&'a str>,
+        redo: Option<&'a str>,
+    },
+    Status(Status),
+    /// All that was known when the page came has been sent, but light.
+    CaughtUp,
+    Probe {
+        question: u64,
+        answer: Option<ProbeAnswer>,
+    },
+    Rays {
+        question: u64,
+        rays: Vec<[[f32; 3]; 2]>,
+    },
+    Refused {
+        message: String,
+    },
+}
+
+impl Say<'_> {
+    /// As JSON.
+    pub fn text(&self) -> String {
+        // Plain data with text for keys always has a form in JSON.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+/// How far the solution is.
+#[derive(Clone, Debug, Serialize)]
+pub struct Status {
+    pub doing: String,
+    pub rays: u32,
+    pub most_rays: u32,
+    pub error: Option<f64>,
+    pub seconds: f64,
+    /// Seconds to the end, about.
+    pub left: Option<f64>,
+    pub rays_traced: u64,
+    pub elements: usize,
+    /// Milliseconds from the last edit to its first complete update.
+    pub latency: Option<f64>,
+    pub is_done: bool,
+    pub edits: u64,
+}
+
+/// What is known of a place.
+#[derive(Clone, Debug, Serialize)]
+pub struct ProbeAnswer {
+    pub illuminance: f32,
+    pub irradiance: Bands,
+    pub reflectance: Bands,
+    pub radiosity: Bands,
+    /// Share of the illuminance that was never reflected.
+    pub direct: f32,
+    pub sources: Vec<SourceShare>,
+}
+
+/// What part of the light comes from where.
+#[derive(Clone, Debug, Serialize)]
+pub struct SourceShare {
+    pub name: String,
+    pub share: f32,
+}
+
+/// The sky as a small picture: rows from the zenith down, columns by azimuth from −X over −Z of a world whose zenith is +Y.
+#[derive(Clone, Debug, Serialize)]
+pub struct SkyPicture {
+    width: usize,
+    height: usize,
+    luminance: Vec<f32>,
+}
+
+/// A picture on an object.
+#[derive(Clone, Debug, Serialize)]
+pub struct TextureUse {
+    index: usize,
+    transform: [f64; 6],
+    wrap: [&'static str; 2],
+    nearest: bool,
+}
+
+impl TextureUse {
+    fn new(texture: &TextureRef) -> TextureUse {
+        let name = |wrap| match wrap {
+            Wrap::Repeat => "repeat",
+            Wrap::Mirror => "mirror",
+            Wrap::Clamp => "clamp",
+        };
+        TextureUse {
+            index: texture.texture,
+            transform: texture.transform.to_cols_array(),
+            wrap: texture.wrap.map(name),
+            nearest: texture.nearest,
+        }
+    }
+}
+
+/// An object, without its triangles.
+pub fn object(object: &ModelObject, scene: &Scene) -> String {
+    let of_scene = object.triangle_of.first().map(|&t| scene.material(t as usize));
+    let texture = of_scene.and_then(|material| material.base_color_texture.as_ref()).filter(|_| object.texture.is_some());
+    Say::Object {
+        id: object.id,
+        name: &object.name,
+        group: object.group,
+        matrix: object.matrix,
+        reflectance: object.reflectance,
+        tint: object.tint,
+        texture: texture.map(TextureUse::new),
+        emission: object.emission.map(|exitance| exitance / PI),
+        deleted: object.deleted,
+        movable: object.movable,
+    }
+    .text()
+}
+
+/// A light.
+pub fn light(light: &ModelLight) -> String {
+    Say::Light {
+        id: light.id,
+        name: &light.name,
+        r#type: light.kind,
+        dimming: light.dimming,
+        colour: light.colour,
+        matrix: light.matrix,
+        position: light.position,
+        object: light.object,
+        deleted: light.deleted,
+    }
+    .text()
+}
+
+/// Sides of the picture of the sky: no more than a background.
+const SKY: [usize; 2] = [128, 64];
+
+/// The sky, if there is light in it.
+pub fn sky(scene: &Scene) -> Option<SkyPicture> {
+    if scene.sky.is_black() {
+        return None;
+    }
+    let [width, height] = SKY;
+    let up = scene.up.direction();
+    let mut luminance = Vec::with_capacity(3 * width * height);
+    for row in 0..height {
+        for column in 0..width {
+            let zenith = std::f64::consts::PI * (row as f64 + 0.5) / height as f64;
+            let azimuth = std::f64::consts::TAU * ((column as f64 + 0.5) / width as f64 - 0.5);
+            let [x, y, z] = [zenith.sin() * azimuth.cos(), zenith.cos(), zenith.sin() * azimuth.sin()];
+            // The page turns the scene's zenith to +Y, about X.
+            let direction = match scene.up {
+                radiosity::Up::Y => [x, y, z],
+                radiosity::Up::Z => [x, -z, y],
+            };
+            luminance.extend(scene.sky.luminance(direction.into(), up));
+        }
+    }
+    Some(SkyPicture { width, height, luminance })
+}
+
+/// The triangles of an object.
+pub fn mesh(object: &ModelObject) -> Bytes {
+    let flags = if object.uvs.is_empty() { 0 } else { HAS_UVS };
+    let (vertices, triangles) = (object.positions.len() as u32, (object.indices.len() / 3) as u32);
+    let words = [MESH, object.id.0, vertices, triangles, flags].into_iter();
+    let floats = object.positions.iter().flatten().chain(object.uvs.iter().flatten()).map(|x| x.to_bits());
+    words.chain(floats).chain(object.indices.iter().copied()).flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
+}
+
+/// Light at vertices, as it is sent.
+pub fn halves(light: &[Bands]) -> Vec<u16> {
+    light.iter().flatten().map(|lux| f16::from_f32((lux / UNIT).clamp(0.0, 65504.0)).to_bits()).collect()
+}
+
+/// A frame of light.
+pub fn light_frame(epoch: u32, chunks: &[LightChunk]) -> Bytes {
+    let mut bytes: Vec<u8> = Vec::with_capacity(8 + chunks.len() * (12 + 6 * CHUNK));
+    bytes.extend([LIGHT, epoch].into_iter().flat_map(u32::to_le_bytes));
+    for LightChunk { object, first, values } in chunks {
+        bytes.extend([*object, *first, values.len() as u32 / 3].into_iter().flat_map(u32::to_le_bytes));
+        bytes.extend(values.iter().flat_map(|half| half.to_le_bytes()));
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+    bytes.into()
+}
+
+/// A picture of the scene as PNG; its alpha is not sent, since the light that passes is in the solution.
+pub fn texture(texture: &Texture) -> Result<Vec<u8>, String> {
+    let pixels: Vec<[u8; 3]> = texture.texels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+    radiosity::io::image_out::encode_png(texture.width, texture.height, &pixels).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_request_is_refused() {
+        let edit = r#"{"kind":"edit","edit":{"light":{"light":0,"dimming":0.5,"colour":[1,1,1]}},"gesture":3}"#;
+        assert!(serde_json::from_str::<Request>(edit).is_ok());
+        assert_eq!(serde_json::from_str::<Request>(r#"{"kind":"undo"}"#).unwrap(), Request::Undo);
+        let deep = format!(r#"{{"kind":"edit","edit":{}{}}}"#, r#"{"several":["#.repeat(50_000), "]}".repeat(50_000));
+        for wrong in [
+            "",
+            "null",
+            "[]",
+            r#"{"kind":"format_disk"}"#,
+            r#"{"kind":"edit"}"#,
+            r#"{"kind":"edit","edit":{"light":{"light":-1,"dimming":0.5,"colour":[1,1,1]}}}"#,
+            r#"{"kind":"edit","edit":{"light":{"light":0,"dimming":1e999,"colour":[1,1,1]}}}"#,
+            r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1]}"#,
+            r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1,0.2],"extra":1}"#,
+            &deep,
+        ] {
+            assert!(serde_json::from_str::<Request>(wrong).is_err(), "{}", &wrong[..wrong.len().min(80)]);
+        }
+    }
+
+    #[test]
+    fn frames_of_light_are_whole_words() {
+        let values = halves(&[[16.0, 32.0, 1e9]]);
+        let frame = light_frame(5, &[LightChunk { object: 3, first: 1024, values }]);
+        let words: Vec<u32> = frame.chunks(4).map(|w| u32::from_le_bytes(w.try_into().unwrap())).collect();
+        assert_eq!(frame.len() % 4, 0);
+        assert_eq!(words[..5], [LIGHT, 5, 3, 1024, 1]);
+        assert_eq!(words[5..], [0x4000_3c00, 0x7bff]);
+    }
+}

@@ -1,0 +1,176 @@
+// Everything by keyboard alone: keys, the list of them, and the cross in the middle that stands for a pointer.
+import { Vector3 } from 'three';
+import type { App } from './app';
+import { screenshot } from './files';
+import { nextName } from './panels/cameras';
+import { el } from './panels/parts';
+import { shared } from './surface';
+
+/** What each key is for, as it is shown. */
+const LIST: [string, [string, string][]][] = [
+  ['Move', [
+    ['W A S D', 'walk; in orbit, go around'],
+    ['↑ ↓ ← →', 'walk and turn'],
+    ['R F', 'look up, down'],
+    ['Q Z', 'rise, sink'],
+    ['Shift', 'faster'],
+    ['V', 'walk or orbit'],
+    ['C', 'next camera'],
+    ['B', 'keep this view'],
+  ]],
+  ['Look', [
+    ['F2', 'false colours in lux'],
+    ['I', 'isolines'],
+    ['L', 'next layer of light'],
+    ['E', 'edges of elements'],
+    ['T', 'rays of the picked element'],
+    ['+ −', 'exposure'],
+    ['0', 'automatic exposure'],
+  ]],
+  ['Measure and change', [
+    ['Enter', 'measure and select what is under the cross'],
+    ['G', 'grid on the picked surface'],
+    ['J K', 'move the selected left, right'],
+    ['U O', 'move it away, towards you'],
+    ['Page ↑ ↓', 'move it up, down'],
+    [', .', 'turn it'],
+    ['M', 'handles: move or turn'],
+    ['Ctrl+D', 'duplicate'],
+    ['Delete', 'delete'],
+    ['Ctrl+Z  Ctrl+Y', 'undo, redo'],
+  ]],
+  ['Page', [
+    ['X', 'screenshot'],
+    ['N', 'show or hide the panel'],
+    ['Tab', 'to the next control'],
+    ['Esc', 'back to the scene; let go'],
+    ['H', 'this list'],
+  ]],
+];
+
+/** Metres and degrees by which a key moves what is selected; finer with Shift. */
+const NUDGE = 0.1;
+const TURN = 5;
+
+/** The list of keys. */
+export function helpDialog(): HTMLDialogElement {
+  const dialog = el('dialog', { id: 'help', 'aria-label': 'Keys' },
+    el('div', { class: 'row' }, el('h2', {}, 'Keys'), el('span', { class: 'grow' }), el('button', { type: 'button', class: 'icon', 'aria-label': 'Close', click: () => dialog.close() }, '×')),
+    el('div', { class: 'keys' }, ...LIST.map(([title, keys]) =>
+      el('section', {}, el('h3', {}, title), el('dl', {}, ...keys.flatMap(([key, does]) => [el('dt', {}, el('kbd', {}, key)), el('dd', {}, does)]))))),
+    el('p', { class: 'quiet' }, 'Drag to look around, click to measure and select, turn the wheel to step. On a touch screen: one finger looks, the stick walks.'));
+  dialog.addEventListener('click', (event) => {
+    if (event.target === dialog) dialog.close();
+  });
+  return dialog;
+}
+
+export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold(): void }): void {
+  const down = new Set<string>();
+  const drive = () => {
+    const is = (...keys: string[]) => (keys.some((key) => down.has(key)) ? 1 : 0);
+    app.navigator.drive = {
+      right: is('d') - is('a'),
+      up: is('q') - is('z'),
+      back: is('s', 'arrowdown') - is('w', 'arrowup'),
+      yaw: is('arrowright') - is('arrowleft'),
+      pitch: is('r') - is('f'),
+      fast: down.has('shift'),
+    };
+  };
+  const held = new Set(['w', 'a', 's', 'd', 'q', 'z', 'r', 'f', 'shift', 'arrowup', 'arrowdown', 'arrowleft', 'arrowright']);
+  const right = () => new Vector3(1, 0, 0).applyQuaternion(app.stage.camera.quaternion).setY(0).normalize();
+  const away = () => right().cross(new Vector3(0, -1, 0)).negate();
+
+  const acts: Record<string, (event: KeyboardEvent) => void> = {
+    v: () => app.walk(app.navigator.mode === 'walk' ? 'orbit' : 'walk'),
+    c: () => nextCamera(app),
+    b: () => app.keepCamera(nextName(app)),
+    f2: () => app.showFalseColours(!app.falseColours),
+    i: () => app.showIsolines(!shared.isolines.value),
+    l: () => nextLayer(app),
+    e: () => app.showEdges(!app.edges),
+    t: () => app.showRays(!app.raysShown),
+    '+': () => app.exposure.set(app.exposure.value + 0.25),
+    '=': () => app.exposure.set(app.exposure.value + 0.25),
+    '-': () => app.exposure.set(app.exposure.value - 0.25),
+    '0': () => app.exposure.automatic(),
+    enter: () => app.pick(0, 0),
+    g: () => app.measure(),
+    m: () => app.gizmo.setMode(app.gizmo.mode === 'translate' ? 'rotate' : 'translate'),
+    delete: () => app.delete(),
+    backspace: () => app.delete(),
+    x: () => screenshot(app),
+    n: () => fold(),
+    h: () => help.showModal(),
+    '?': () => help.showModal(),
+    escape: () => app.select(null),
+    j: (event) => app.nudge(right().multiplyScalar(-size(event)), 0),
+    k: (event) => app.nudge(right().multiplyScalar(size(event)), 0),
+    u: (event) => app.nudge(away().multiplyScalar(size(event)), 0),
+    o: (event) => app.nudge(away().multiplyScalar(-size(event)), 0),
+    pageup: (event) => app.nudge(new Vector3(0, size(event), 0), 0),
+    pagedown: (event) => app.nudge(new Vector3(0, -size(event), 0), 0),
+    ',': (event) => app.nudge(new Vector3(), angle(event)),
+    '.': (event) => app.nudge(new Vector3(), -angle(event)),
+  };
+  const size = (event: KeyboardEvent) => (event.shiftKey ? 0.1 : 1) * NUDGE * Math.min(1, app.stage.bounds.getSize(new Vector3()).length() / 5);
+  const angle = (event: KeyboardEvent) => ((event.shiftKey ? 0.2 : 1) * TURN * Math.PI) / 180;
+
+  addEventListener('keydown', (event) => {
+    const target = event.target as HTMLElement;
+    const key = event.key.toLowerCase();
+    if (help.open) return;
+    const isField = target.matches('input:not([type=checkbox]), select, textarea');
+    if (key === 'escape' && target !== app.stage.canvas) {
+      app.stage.canvas.focus();
+      return;
+    }
+    if (event.ctrlKey || event.metaKey) {
+      if (isField && target.matches('[type=text], [type=number]') && (key === 'z' || key === 'y')) return;
+      if (key === 'z') (event.shiftKey ? app.redo() : app.undo());
+      else if (key === 'y') app.redo();
+      else if (key === 'd') app.duplicate();
+      else return;
+      event.preventDefault();
+      return;
+    }
+    if (isField || event.altKey) return;
+    // What a focused control does itself.
+    if (target !== app.stage.canvas && target !== document.body && ['enter', ' ', 'arrowup', 'arrowdown', 'arrowleft', 'arrowright'].includes(key)) return;
+    if (held.has(key)) {
+      down.add(key);
+      drive();
+      if (key.startsWith('arrow')) event.preventDefault();
+      return;
+    }
+    const act = acts[key];
+    if (!act) return;
+    event.preventDefault();
+    act(event);
+  });
+  addEventListener('keyup', (event) => {
+    down.delete(event.key.toLowerCase());
+    drive();
+  });
+  addEventListener('blur', () => {
+    down.clear();
+    drive();
+  });
+}
+
+let camera = -1;
+
+function nextCamera(app: App): void {
+  const all = [...(app.scene?.cameras ?? []), ...app.bookmarks];
+  if (all.length === 0) return app.say('There is no camera; B keeps this view as one.');
+  camera = (camera + 1) % all.length;
+  app.look(all[camera]);
+}
+
+function nextLayer(app: App): void {
+  const select = document.querySelector<HTMLSelectElement>('#layer')!;
+  select.selectedIndex = (select.selectedIndex + 1) % select.options.length;
+  app.showLayer(JSON.parse(select.value));
+  app.say(`Layer: ${select.selectedOptions[0].text}.`);
+}

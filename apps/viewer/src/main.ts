@@ -1,0 +1,81 @@
+// The page of `radiosity view`: puts its parts together and keeps time.
+import './style.css';
+import { App } from './app';
+import { helpDialog, listen } from './keys';
+import { gridNumbers, legend } from './legend';
+import { bar } from './panels/bar';
+import { camerasPanel } from './panels/cameras';
+import { lightsPanel } from './panels/lights';
+import { gridPanel, meterPanel } from './panels/meter';
+import { el } from './panels/parts';
+import { thingPanel } from './panels/thing';
+import { viewPanel } from './panels/view';
+import { stick } from './stick';
+import { tests } from './tests';
+
+/** Farther than this a press is a drag, CSS pixels. */
+const CLICK = 5;
+
+/** On narrower pages the panel begins folded. */
+const NARROW = 760;
+
+function start(): void {
+  const app = new App();
+  const help = helpDialog();
+  const fold = () => {
+    const isFolded = document.body.classList.toggle('folded');
+    document.querySelector('#fold')?.setAttribute('aria-expanded', String(!isFolded));
+  };
+  const panel = el('aside', { class: 'panel', 'aria-label': 'Tools' },
+    viewPanel(app), lightsPanel(app), meterPanel(app), thingPanel(app), gridPanel(app), camerasPanel(app));
+  const doing = el('span', { id: 'doing', role: 'status' });
+  const message = el('span', { id: 'message', role: 'alert' });
+  const numbers = gridNumbers(app);
+  const cross = el('div', { class: 'cross', 'aria-hidden': 'true' });
+  const veil = el('div', { class: 'veil' }, el('p', {}, 'Opening …'));
+  const view = el('main', {}, app.stage.canvas, cross, numbers.element, legend(app), stick(app), veil);
+  document.body.append(bar(app, { help: () => help.showModal(), fold }), view, panel, el('footer', {}, doing, el('span', { class: 'grow' }), message), help);
+  if (innerWidth < NARROW) fold();
+  listen(app, { help, fold });
+
+  app.on('status', () => { doing.textContent = app.status?.doing ?? ''; });
+  app.on('message', () => { message.textContent = app.message; });
+  app.on('connection', () => {
+    veil.hidden = app.isCaughtUp || (app.scene !== null && app.isConnected);
+    veil.firstElementChild!.textContent = app.scene && !app.isConnected ? 'The connection was lost. Trying again …' : 'Opening …';
+    document.body.classList.toggle('lost', !app.isConnected);
+  });
+
+  let pressed: [number, number] | null = null;
+  const { canvas } = app.stage;
+  canvas.addEventListener('pointerdown', (event) => {
+    pressed = event.button === 0 && !app.gizmo.isOver ? [event.clientX, event.clientY] : null;
+  });
+  canvas.addEventListener('pointerup', (event) => {
+    if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > CLICK) return;
+    const box = canvas.getBoundingClientRect();
+    const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+    const lamp = app.marks.lampAt(x, y);
+    if (lamp !== null) app.selectLight(lamp);
+    else app.pick((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
+  });
+  // The cross shows where a keyboard measures; a pointer has its own.
+  addEventListener('keydown', () => document.body.classList.add('by-keys'));
+  addEventListener('pointerdown', () => document.body.classList.remove('by-keys'));
+
+  let last = performance.now();
+  const tick = (now: number) => {
+    const passed = Math.min(100, now - last);
+    last = now;
+    app.navigator.update(passed / 1000);
+    app.exposure.update(now, passed);
+    app.stage.draw();
+    numbers.update();
+    requestAnimationFrame(tick);
+  };
+  requestAnimationFrame(tick);
+  canvas.focus();
+  Object.assign(window, { radiosity: tests(app) });
+}
+
+start();

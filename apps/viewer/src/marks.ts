@@ -1,0 +1,182 @@
+// What is drawn over the scene: the probe, the outline of what is selected, edges of elements, rays, a grid, lights without area.
+import {
+  BoxHelper, BufferAttribute, BufferGeometry, CanvasTexture, Color, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Matrix4, Mesh,
+  MeshBasicMaterial, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, Vector3, WireframeGeometry, type Object3D,
+} from 'three';
+import type { Grid } from './grid';
+import { discard, type Hit, type Stage } from './stage';
+import type { Surface } from './surface';
+import type { LightNotice } from './wire';
+
+export const ACCENT = 0xe8b04a;
+
+/** More triangles than this are outlined by a box: their edges would take long to find. */
+const OUTLINED = 60_000;
+
+export class Marks {
+  private outlined: Object3D | null = null;
+  private wires = new Map<number, LineSegments>();
+  private ring: Group | null = null;
+  private lines: LineSegments | null = null;
+  private gridded: Group | null = null;
+  readonly lamps = new Map<number, Sprite>();
+  private lampPicture: CanvasTexture | null = null;
+
+  constructor(private stage: Stage) {}
+
+  /** The edges of the thing that is selected. */
+  outline(surface: Surface | null): void {
+    if (this.outlined) discard(this.outlined);
+    this.outlined = null;
+    if (surface) {
+      const isLarge = surface.geometry.index!.count / 3 > OUTLINED;
+      if (isLarge) {
+        this.outlined = new BoxHelper(surface, ACCENT);
+        this.stage.tools.add(this.outlined);
+      } else {
+        const lines = new LineSegments(new EdgesGeometry(surface.geometry, 20), new LineBasicMaterial({ color: ACCENT, transparent: true, opacity: 0.9, depthTest: false }));
+        lines.matrixAutoUpdate = false;
+        lines.matrix.copy(surface.matrix);
+        lines.renderOrder = 3;
+        this.outlined = lines;
+        this.stage.overlay.add(lines);
+      }
+    }
+    this.stage.change();
+  }
+
+  /** The thing that is selected has moved. */
+  follow(surface: Surface): void {
+    this.outlined?.matrix.copy(surface.matrix);
+    if (this.outlined) this.outlined.matrixWorldNeedsUpdate = true;
+    const wires = this.wires.get(surface.object);
+    wires?.matrix.copy(surface.matrix);
+    if (wires) wires.matrixWorldNeedsUpdate = true;
+    this.stage.change();
+  }
+
+  /** The edges of all elements. */
+  edges(surfaces: Map<number, Surface>): void {
+    for (const [object, wires] of this.wires) {
+      const surface = surfaces.get(object);
+      if (!surface || !surface.visible || wires.userData.of !== surface) {
+        discard(wires);
+        this.wires.delete(object);
+      }
+    }
+    for (const [object, surface] of surfaces) {
+      if (!surface.visible || this.wires.has(object)) continue;
+      const material = new LineBasicMaterial({ color: 0x8fb7d9, transparent: true, opacity: 0.35, depthWrite: false });
+      material.polygonOffset = true;
+      const wires = new LineSegments(new WireframeGeometry(surface.geometry), material);
+      wires.userData.of = surface;
+      wires.matrixAutoUpdate = false;
+      wires.matrix.copy(surface.matrix);
+      // Lines lie in the surfaces; drawn a little nearer they are seen.
+      wires.onBeforeRender = (_renderer, _scene, camera) => {
+        camera.projectionMatrix.elements[14] *= 1.0015;
+      };
+      wires.onAfterRender = (_renderer, _scene, camera) => {
+        camera.projectionMatrix.elements[14] /= 1.0015;
+      };
+      this.wires.set(object, wires);
+      this.stage.overlay.add(wires);
+    }
+    this.stage.change();
+  }
+
+  /** Where the probe is. */
+  point(hit: Hit | null): void {
+    if (this.ring) discard(this.ring);
+    this.ring = null;
+    if (hit) {
+      const size = 0.012 * Math.max(hit.distance, 0.05);
+      const ring = (inner: number, outer: number, colour: number, order: number) => {
+        const mesh = new Mesh(new RingGeometry(inner * size, outer * size, 40), new MeshBasicMaterial({ color: colour, depthTest: false, transparent: true, side: 2, toneMapped: false }));
+        mesh.renderOrder = order;
+        return mesh;
+      };
+      this.ring = new Group().add(ring(0.55, 1.25, 0x111111, 4), ring(0.7, 1.1, 0xffffff, 5), ring(0, 0.22, 0xffffff, 5));
+      this.ring.position.copy(hit.point).addScaledVector(hit.normal, 0.1 * size);
+      this.ring.lookAt(hit.point.clone().addScaledVector(hit.normal, 1));
+      this.stage.tools.add(this.ring);
+    }
+    this.stage.change();
+  }
+
+  /** Rays of an element, from origin to end, in the scene's axes. */
+  rays(rays: [number[], number[]][]): void {
+    if (this.lines) discard(this.lines);
+    this.lines = null;
+    if (rays.length > 0) {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute('position', new BufferAttribute(new Float32Array(rays.flat(2)), 3));
+      const [near, far] = [new Color(ACCENT), new Color(0x5b97d8)];
+      geometry.setAttribute('color', new BufferAttribute(new Float32Array(rays.flatMap(() => [...near.toArray(), ...far.toArray()])), 3));
+      this.lines = new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.55, depthWrite: false }));
+      this.stage.overlay.add(this.lines);
+    }
+    this.stage.change();
+  }
+
+  /** Points of a grid; their numbers are written by the page. */
+  grid(grid: Grid | null): void {
+    if (this.gridded) discard(this.gridded);
+    this.gridded = null;
+    if (grid) {
+      const geometry = new BufferGeometry().setFromPoints(grid.points.map((p) => p.point.clone().addScaledVector(grid.normal, 1e-3)));
+      const dots = new Points(geometry, new PointsMaterial({ color: 0xffffff, size: 4, sizeAttenuation: false, depthTest: false, transparent: true }));
+      dots.renderOrder = 4;
+      this.gridded = new Group().add(dots);
+      this.stage.tools.add(this.gridded);
+    }
+    this.stage.change();
+  }
+
+  /** A light without area. */
+  light(light: LightNotice): void {
+    if (!light.matrix || light.object !== null || light.type === 'sky') return;
+    let sprite = this.lamps.get(light.id);
+    if (!sprite) {
+      this.lampPicture ??= lampPicture();
+      sprite = new Sprite(new SpriteMaterial({ map: this.lampPicture, depthTest: true, sizeAttenuation: false, toneMapped: false }));
+      sprite.scale.setScalar(0.045);
+      this.lamps.set(light.id, sprite);
+      this.stage.overlay.add(sprite);
+    }
+    sprite.position.copy(new Vector3().setFromMatrixPosition(new Matrix4().fromArray(light.matrix)));
+    sprite.material.opacity = light.dimming > 0 ? 1 : 0.45;
+    this.stage.change();
+  }
+
+  /** The light without area at a place of the canvas, CSS pixels. */
+  lampAt(x: number, y: number): number | null {
+    for (const [id, sprite] of this.lamps) {
+      const at = this.stage.project(sprite.getWorldPosition(new Vector3()));
+      if (at && Math.hypot(at.x - x, at.y - y) < 16) return id;
+    }
+    return null;
+  }
+}
+
+function lampPicture(): CanvasTexture {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 64;
+  const pen = canvas.getContext('2d')!;
+  pen.strokeStyle = pen.fillStyle = '#e8b04a';
+  pen.lineWidth = 5;
+  pen.lineCap = 'round';
+  pen.beginPath();
+  pen.arc(32, 32, 11, 0, 2 * Math.PI);
+  pen.fill();
+  for (let i = 0; i < 8; i += 1) {
+    const [x, y] = [Math.cos((i * Math.PI) / 4), Math.sin((i * Math.PI) / 4)];
+    pen.beginPath();
+    pen.moveTo(32 + 19 * x, 32 + 19 * y);
+    pen.lineTo(32 + 27 * x, 32 + 27 * y);
+    pen.stroke();
+  }
+  const texture = new CanvasTexture(canvas);
+  texture.colorSpace = 'srgb';
+  return texture;
+}

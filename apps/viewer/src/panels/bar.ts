@@ -1,0 +1,90 @@
+// The bar above: what is open, how far the solution is, and what is needed most.
+import type { App } from '../app';
+import { screenshot } from '../files';
+import { readable } from '../scale';
+import { button, choice, el } from './parts';
+
+export function bar(app: App, { help, fold }: { help(): void; fold(): void }): HTMLElement {
+  const title = el('b', { class: 'scene' });
+  const progress = el('i', { class: 'progress', role: 'progressbar', 'aria-label': 'Solution', 'aria-valuemin': 0, 'aria-valuemax': 100 });
+  const error = el('span', { id: 'error', title: 'Estimated relative error of illuminance, over all surfaces' });
+  const rays = el('span', { class: 'wide', id: 'rays' });
+  const left = el('span', { class: 'wide', id: 'left' });
+  const mode = choice('How to move', [['walk', 'Walk', 'V'], ['orbit', 'Orbit', 'V']], (value) => app.walk(value));
+  const undo = button('↶', () => app.undo(), { key: 'Ctrl+Z', title: 'Undo', kind: 'icon' });
+  const redo = button('↷', () => app.redo(), { key: 'Ctrl+Y', title: 'Redo', kind: 'icon' });
+  undo.setAttribute('aria-label', 'Undo');
+  redo.setAttribute('aria-label', 'Redo');
+  const menu = el('div', { class: 'menu', role: 'menu', hidden: true },
+    el('button', { type: 'button', role: 'menuitem', click: () => { screenshot(app); open(false); } }, 'Screenshot', el('span', { class: 'quiet' }, '.png')),
+    el('a', { role: 'menuitem', href: 'lit.glb', download: '', click: () => open(false) }, 'Lit model', el('span', { class: 'quiet' }, '.glb')),
+    el('a', { role: 'menuitem', href: 'scene.glb', download: '', click: () => open(false) }, 'Edited scene', el('span', { class: 'quiet' }, '.glb')));
+  const save = button('Save', () => open(menu.hidden !== false), { title: 'Screenshot, lit model, edited scene' });
+  save.id = 'save';
+  save.setAttribute('aria-haspopup', 'menu');
+  const open = (is: boolean) => {
+    menu.hidden = !is;
+    save.setAttribute('aria-expanded', String(is));
+    if (is) (menu.firstElementChild as HTMLElement).focus();
+  };
+  document.addEventListener('pointerdown', (event) => {
+    if (!menu.hidden && !menu.parentElement!.contains(event.target as Node)) open(false);
+  });
+  menu.addEventListener('keydown', (event) => {
+    const items = [...menu.children] as HTMLElement[];
+    const at = items.indexOf(document.activeElement as HTMLElement);
+    if (event.key === 'ArrowDown') items[(at + 1) % items.length].focus();
+    else if (event.key === 'ArrowUp') items[(at + items.length - 1) % items.length].focus();
+    else if (event.key === 'Escape') {
+      open(false);
+      save.focus();
+    } else return;
+    event.preventDefault();
+    event.stopPropagation();
+  });
+  const panel = button('Panel', fold, { key: 'N', title: 'Show or hide the panel' });
+  panel.id = 'fold';
+
+  app.on('scene', () => {
+    title.textContent = app.scene?.name ?? '';
+    document.title = app.scene ? `${app.scene.name} – radiosity` : 'radiosity';
+  });
+  app.on('view', () => mode.set(app.navigator.mode));
+  app.on('history', () => {
+    undo.disabled = app.undoable === null;
+    redo.disabled = app.redoable === null;
+    undo.title = app.undoable ? `Undo: ${app.undoable} (Ctrl+Z)` : 'Nothing to undo';
+    redo.title = app.redoable ? `Redo: ${app.redoable} (Ctrl+Y)` : 'Nothing to redo';
+  });
+  app.on('status', () => {
+    const { status } = app;
+    if (!status) return;
+    // Each doubling of rays is as long as all before; the bar shows time.
+    const share = status.is_done ? 100 : Math.min(99, (100 * status.rays) / Math.max(1, status.most_rays));
+    progress.style.width = `${share}%`;
+    progress.setAttribute('aria-valuenow', share.toFixed(0));
+    progress.classList.toggle('done', status.is_done);
+    rays.textContent = `${status.rays} of ${status.most_rays} rays`;
+    error.textContent = status.error === null ? 'error not known yet' : `± ${percent(status.error)}`;
+    left.textContent = status.is_done ? `done in ${duration(status.seconds)}` : status.left === null ? '' : `${duration(status.left)} left`;
+  });
+  return el('header', {},
+    el('div', { class: 'track' }, progress),
+    el('span', { class: 'brand', 'aria-hidden': 'true' }),
+    title,
+    el('span', { class: 'figures' }, error, rays, left),
+    el('span', { class: 'grow' }),
+    mode, undo, redo, el('span', { class: 'anchor' }, save, menu),
+    button('?', help, { key: 'H', title: 'Keys', kind: 'icon' }),
+    panel);
+}
+
+export function percent(share: number): string {
+  return `${readable(100 * share)} %`;
+}
+
+export function duration(seconds: number): string {
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 90) return `${Math.round(seconds)} s`;
+  return `${Math.round(seconds / 60)} min`;
+}

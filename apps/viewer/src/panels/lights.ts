@@ -1,0 +1,81 @@
+// Lights: on and off, dimming, colour.
+import type { App } from '../app';
+import type { LightNotice } from '../wire';
+import { button, el, hex, linear, section, slider } from './parts';
+
+const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', directional: 'Directional', sky: 'Sky' };
+
+export function lightsPanel(app: App): HTMLElement {
+  const list = el('div', { class: 'list' });
+  const rows = new Map<number, (light: LightNotice) => void>();
+  const none = el('p', { class: 'quiet' }, 'This scene has no light.');
+  const all = el('div', { class: 'row' },
+    button('All on', () => switchAll(1), { title: 'Turn all lights on' }),
+    button('All off', () => switchAll(0), { title: 'Turn all lights off' }));
+  const switchAll = (dimming: number) => {
+    const gesture = app.nextGesture();
+    for (const light of app.lights.values()) app.setLight(light, { dimming }, gesture);
+  };
+  app.on('lights', () => {
+    for (const light of app.lights.values()) {
+      if (!rows.has(light.id)) {
+        const { element, set } = row(app, light.id);
+        rows.set(light.id, set);
+        list.append(element);
+      }
+      rows.get(light.id)!(light);
+    }
+    none.hidden = rows.size > 0;
+    all.hidden = rows.size < 2;
+  });
+  return section('lights', 'Lights', true, none, all, list);
+}
+
+function row(app: App, id: number): { element: HTMLElement; set(light: LightNotice): void } {
+  const light = () => app.lights.get(id)!;
+  let gesture: number | null = null;
+  let last = 1;
+  const during = (isLast: boolean) => {
+    gesture ??= app.nextGesture();
+    const now = gesture;
+    if (isLast) gesture = null;
+    return now;
+  };
+  const name = light().name || `Light ${id + 1}`;
+  const on = el('input', {
+    type: 'checkbox', role: 'switch', 'aria-label': `${name} on`,
+    change: () => app.setLight(light(), { dimming: on.checked ? last || 1 : 0 }),
+  });
+  const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%' }, (value, isLast) => {
+    app.setLight(light(), { dimming: Math.min(100, Math.max(0, value / 100)) }, during(isLast));
+  });
+  const colour = el('input', {
+    type: 'color', 'aria-label': `Colour of ${name}, relative to its own`, title: 'Colour, relative to its own; its light in lumens stays',
+    input: () => app.setLight(light(), { colour: filter(colour.value) }, during(false)),
+    change: () => app.setLight(light(), { colour: filter(colour.value) }, during(true)),
+  });
+  const find = el('button', {
+    type: 'button', class: 'name', title: 'Select it in the scene',
+    click: () => (light().object !== null ? app.select(light().object) : app.selectLight(id)),
+  }, el('b', {}, name), el('span', { class: 'quiet' }, KINDS[light().type] ?? ''));
+  const element = el('div', { class: 'light' },
+    el('div', { class: 'row' }, el('label', { class: 'toggle bare' }, on, el('i')), find, colour), dimming);
+  return {
+    element,
+    set(now) {
+      if (now.dimming > 0) last = now.dimming;
+      on.checked = now.dimming > 0;
+      element.classList.toggle('off', now.dimming === 0);
+      dimming.set(100 * now.dimming);
+      const peak = Math.max(...now.colour, 1e-9);
+      if (document.activeElement !== colour) colour.value = hex(now.colour.map((c) => c / peak));
+    },
+  };
+}
+
+/** The factor by band that tints light and keeps its luminance. */
+function filter(value: string): number[] {
+  const [r, g, b] = linear(value);
+  const luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  return luminance > 1e-3 ? [r, g, b].map((c) => c / luminance) : [1, 1, 1];
+}

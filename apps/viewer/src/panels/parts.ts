@@ -1,0 +1,92 @@
+// The few parts that panels are made of.
+
+type Child = Node | string | null;
+type Attributes = Record<string, string | number | boolean | ((event: never) => void) | undefined>;
+
+/** An element with attributes and children; functions listen, `false` and `undefined` are left out. */
+export function el<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Attributes = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (typeof value === 'function') element.addEventListener(name, value as EventListener);
+    else if (value === true) element.setAttribute(name, '');
+    else if (value !== false && value !== undefined) element.setAttribute(name, String(value));
+  }
+  element.append(...children.filter((child) => child !== null));
+  return element;
+}
+
+/** A button; `key` is the key that does the same. */
+export function button(label: string, act: () => void, { key, title, kind = '' }: { key?: string; title?: string; kind?: string } = {}): HTMLButtonElement {
+  const help = [title ?? label, key ? `(${key})` : ''].filter(Boolean).join(' ');
+  return el('button', { type: 'button', class: kind, title: help, 'aria-keyshortcuts': key, click: () => act() }, label);
+}
+
+/** A switch. */
+export function toggle(label: string, act: (is: boolean) => void, key?: string): HTMLLabelElement & { set(is: boolean): void } {
+  const input = el('input', { type: 'checkbox', role: 'switch', change: () => act(input.checked) });
+  const made = el('label', { class: 'toggle', title: key ? `${label} (${key})` : label }, input, el('i'), el('span', {}, label), key ? el('kbd', {}, key) : null);
+  return Object.assign(made, { set: (is: boolean) => { input.checked = is; } });
+}
+
+/** A part of the panel that folds. */
+export function section(id: string, title: string, open: boolean, ...children: Child[]): HTMLDetailsElement {
+  return el('details', { id, open }, el('summary', {}, title), el('div', { class: 'body' }, ...children));
+}
+
+/** A slider with a number beside it. */
+export function slider(
+  label: string,
+  { min, max, step, unit = '' }: { min: number; max: number; step: number; unit?: string },
+  act: (value: number, isLast: boolean) => void,
+): HTMLDivElement & { set(value: number): void } {
+  const range = el('input', { type: 'range', min, max, step, 'aria-label': label, input: () => give(range, false), change: () => give(range, true) });
+  const number = el('input', { type: 'number', step, 'aria-label': `${label}${unit ? `, ${unit}` : ''}`, change: () => give(number, true) });
+  const set = (value: number) => {
+    const text = String(Number(value.toFixed(3)));
+    if (document.activeElement !== number) number.value = text;
+    range.value = text;
+    const share = (100 * (Math.min(max, Math.max(min, value)) - min)) / (max - min);
+    range.style.setProperty('--share', `${share}%`);
+  };
+  const give = (input: HTMLInputElement, isLast: boolean) => {
+    const value = input.valueAsNumber;
+    if (!Number.isFinite(value)) return;
+    act(value, isLast);
+    set(value);
+  };
+  return Object.assign(el('div', { class: 'slider' }, range, el('span', { class: 'number' }, number, unit ? el('span', { class: 'unit' }, unit) : null)), { set });
+}
+
+/** A choice of one of a few, all in sight. */
+export function choice<T extends string>(label: string, options: [T, string, string?][], act: (value: T) => void): HTMLDivElement & { set(value: T): void } {
+  const buttons = options.map(([value, text, key]) =>
+    el('button', { type: 'button', role: 'radio', title: key ? `${text} (${key})` : text, 'data-value': value, click: () => act(value) }, text));
+  const set = (value: T) => {
+    for (const one of buttons) {
+      one.setAttribute('aria-checked', String(one.dataset.value === value));
+    }
+  };
+  return Object.assign(el('div', { class: 'choice', role: 'radiogroup', 'aria-label': label }, ...buttons), { set });
+}
+
+/** A name and a value. */
+export function fact(name: string, value: Child): HTMLDivElement {
+  return el('div', { class: 'fact' }, el('span', { class: 'quiet' }, name), el('b', {}, value ?? '–'));
+}
+
+/** Linear light to what a colour field holds, and back. */
+export function hex(linear: number[]): string {
+  const byte = (x: number) => {
+    const c = Math.min(1, Math.max(0, x));
+    return Math.round(255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055)).toString(16).padStart(2, '0');
+  };
+  return `#${linear.map(byte).join('')}`;
+}
+
+export function linear(hexadecimal: string): [number, number, number] {
+  const one = (at: number) => {
+    const s = parseInt(hexadecimal.slice(at, at + 2), 16) / 255;
+    return s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4;
+  };
+  return [one(1), one(3), one(5)];
+}

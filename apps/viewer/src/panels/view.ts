@@ -1,0 +1,65 @@
+// How the light is shown: exposure, false colours, layers.
+import type { App } from '../app';
+import { shared } from '../surface';
+import type { Layer } from '../wire';
+import { button, choice, el, section, slider, toggle } from './parts';
+
+/** Bounces that have a layer of their own. */
+const BOUNCES = 6;
+
+export function viewPanel(app: App): HTMLElement {
+  const look = choice('Colours', [['eye', 'As seen', 'F2'], ['lux', 'Lux', 'F2']], (value) => app.showFalseColours(value === 'lux'));
+  look.id = 'colours';
+  const exposure = slider('Exposure', { min: -16, max: 8, step: 0.1, unit: 'EV' }, (value) => app.exposure.set(value));
+  const automatic = toggle('Automatic exposure', (is) => (is ? app.exposure.automatic() : app.exposure.set(app.exposure.value)), '0');
+  const isolines = toggle('Isolines', (is) => app.showIsolines(is), 'I');
+  const edges = toggle('Edges of elements', (is) => app.showEdges(is), 'E');
+  const rays = toggle('Rays of the picked element', (is) => app.showRays(is), 'T');
+  const layer = el('select', {
+    id: 'layer', 'aria-label': 'Layer of light', change: () => app.showLayer(JSON.parse(layer.value) as Layer),
+  });
+  const low = el('input', { type: 'number', min: 0, step: 'any', 'aria-label': 'Lower end of the scale, lx', change: () => setRange() });
+  const high = el('input', { type: 'number', min: 0, step: 'any', 'aria-label': 'Upper end of the scale, lx', change: () => setRange() });
+  const setRange = () => {
+    const range: [number, number] = [low.valueAsNumber, high.valueAsNumber];
+    if (range[0] > 0 && range[1] > range[0]) app.exposure.setRange(range);
+    else app.say('The scale goes from a number above 0 to a larger one.');
+  };
+  const scale = el('div', { class: 'row scale-row' }, el('span', { class: 'quiet' }, 'Scale'), low, el('span', { class: 'quiet' }, 'to'), high, el('span', { class: 'unit' }, 'lx'),
+    button('Auto', () => app.exposure.setRange(null), { title: 'Fit the scale to what is seen' }));
+
+  const options = () => {
+    const option = (value: Layer, text: string) => el('option', { value: JSON.stringify(value) }, text);
+    const lights = [...app.lights.values()].map((light) => option({ light: light.id }, light.name || `Light ${light.id + 1}`));
+    const bounces = Array.from({ length: BOUNCES }, (_, i) => option({ bounce: i + 1 }, i === 0 ? 'First bounce' : `Bounce ${i + 1}`));
+    layer.replaceChildren(option('total', 'All light'), option('direct', 'Direct light'), option('indirect', 'Indirect light'),
+      el('optgroup', { label: 'Bounces' }, ...bounces), lights.length > 0 ? el('optgroup', { label: 'Lights alone' }, ...lights) : '',
+      option('error', 'Estimated error'));
+    layer.value = JSON.stringify(app.layer);
+  };
+  let names = '';
+  app.on('lights', () => {
+    const now = [...app.lights.values()].map((light) => light.name).join('\n');
+    if (now !== names || layer.options.length === 0) options();
+    names = now;
+  });
+  app.on('view', () => {
+    look.set(app.falseColours ? 'lux' : 'eye');
+    exposure.set(app.exposure.value);
+    automatic.set(app.exposure.isAutomatic);
+    isolines.set(shared.isolines.value);
+    edges.set(app.edges);
+    rays.set(app.raysShown);
+    layer.value = JSON.stringify(app.layer);
+    scale.hidden = !app.falseColours && !shared.isolines.value && app.layer !== 'error';
+    for (const [input, value] of [[low, app.exposure.range[0]], [high, app.exposure.range[1]]] as const) {
+      if (document.activeElement !== input) input.value = String(Number(value.toPrecision(3)));
+    }
+  });
+  return section('view', 'View', true,
+    el('div', { class: 'row' }, look),
+    scale,
+    el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Layer'), layer),
+    el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Exposure'), exposure),
+    automatic, isolines, edges, rays);
+}

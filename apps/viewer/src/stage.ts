@@ -1,0 +1,302 @@
+// What stands on the screen: surfaces, sky, a camera; drawn only when something has changed.
+import {
+  BackSide, Box3, DataTexture, FloatType, GLSL3, Group, LinearFilter, Matrix4, Mesh, Object3D, PerspectiveCamera,
+  Quaternion, Ray, RepeatWrapping, RGBAFormat, Scene, ShaderMaterial, type Side, SphereGeometry, Vector2, Vector3, WebGLRenderer,
+  WebGLRenderTarget,
+} from 'three';
+import { DISPLAY, Mode, shared, type Surface } from './surface';
+import type { CameraPlace, SceneNotice } from './wire';
+
+/** Where a ray ended. */
+export interface Hit {
+  surface: Surface;
+  /** In the world, whose zenith is +Y. */
+  point: Vector3;
+  /** Of the side that the ray came to. */
+  normal: Vector3;
+  distance: number;
+  triangle: number;
+  /** Weights of the triangle's corners 1 and 2. */
+  uv: [number, number];
+}
+
+/** The picture that the meter sees. */
+const METER = [64, 40];
+
+/** What the meter saw: luminance and illuminance of the pixels that show a surface. */
+export interface Metered {
+  luminance: number[];
+  illuminance: number[];
+}
+
+export class Stage {
+  readonly canvas = document.createElement('canvas');
+  readonly renderer: WebGLRenderer;
+  readonly scene = new Scene();
+  /** The scene's axes, turned so that its zenith is +Y. */
+  readonly root = new Group();
+  readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
+  readonly surfaces = new Map<number, Surface>();
+  /** What is drawn over the scene and is no part of it. */
+  readonly overlay = new Group();
+  /** Things that stand in the overlay but not in the scene's axes. */
+  readonly tools = new Group();
+  readonly bounds = new Box3(new Vector3(-1, 0, -1), new Vector3(1, 2, 1));
+  frames = 0;
+  private dirty = true;
+  private boxes = new Map<number, Box3>();
+  private sky: Mesh<SphereGeometry, ShaderMaterial>;
+  private meter = new WebGLRenderTarget(METER[0], METER[1], { type: FloatType, format: RGBAFormat });
+  private isMetering = false;
+
+  constructor() {
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, powerPreference: 'high-performance' });
+    this.renderer.info.autoReset = true;
+    this.canvas.tabIndex = 0;
+    this.canvas.id = 'stage';
+    this.canvas.setAttribute('role', 'application');
+    this.canvas.setAttribute('aria-label', 'The scene. Walk with W A S D or the arrow keys; press H for the list of keys.');
+    this.sky = new Mesh(new SphereGeometry(1, 48, 24), new ShaderMaterial({
+      glslVersion: GLSL3,
+      side: BackSide,
+      depthTest: false,
+      depthWrite: false,
+      uniforms: { ...shared, picture: { value: null }, hasPicture: { value: false } },
+      vertexShader: /* glsl */ `
+        out vec3 direction;
+        void main() {
+          direction = position;
+          gl_Position = (projectionMatrix * vec4(mat3(viewMatrix) * position, 1.0)).xyww;
+        }`,
+      fragmentShader: /* glsl */ `
+        precision highp float;
+        in vec3 direction;
+        uniform int mode;
+        uniform float exposure;
+        uniform sampler2D picture;
+        uniform bool hasPicture;
+        out vec4 outColour;
+        ${DISPLAY}
+        void main() {
+          vec3 d = normalize(direction);
+          vec3 background = vec3(0.055, 0.059, 0.066);
+          vec2 at = vec2(atan(d.z, d.x) / 6.28318530718 + 0.5, acos(clamp(d.y, -1.0, 1.0)) / 3.14159265359);
+          vec3 colour = hasPicture ? display(texture(picture, at).rgb, exposure) : background;
+          outColour = mode == ${Mode.Meter} ? vec4(0.0) : vec4(mode == ${Mode.Lux} ? background : colour, 1.0);
+        }`,
+    }));
+    this.sky.renderOrder = -1;
+    this.sky.frustumCulled = false;
+    this.scene.add(this.sky, this.root, this.tools);
+    this.root.add(this.overlay);
+    new ResizeObserver(() => this.resize()).observe(this.canvas);
+  }
+
+  /** The axes, the bounds and the sky of a scene. */
+  begin(scene: SceneNotice): void {
+    this.root.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(...scene.up), new Vector3(0, 1, 0)));
+    this.root.updateMatrixWorld(true);
+    this.bounds.set(new Vector3(...scene.low), new Vector3(...scene.high)).applyMatrix4(this.root.matrixWorld);
+    const size = this.bounds.getSize(new Vector3()).length();
+    this.camera.near = Math.min(0.05, size / 500);
+    this.camera.far = Math.max(100, 6 * size);
+    this.camera.updateProjectionMatrix();
+    if (scene.sky) {
+      const { width, height, luminance } = scene.sky;
+      const data = new Float32Array(4 * width * height);
+      for (let i = 0; i < width * height; i += 1) data.set([...luminance.slice(3 * i, 3 * i + 3), 1], 4 * i);
+      const texture = new DataTexture(data, width, height, RGBAFormat, FloatType);
+      this.renderer.extensions.has('OES_texture_float_linear');
+      texture.wrapS = RepeatWrapping;
+      texture.magFilter = texture.minFilter = LinearFilter;
+      texture.needsUpdate = true;
+      this.sky.material.uniforms.picture.value = texture;
+      this.sky.material.uniforms.hasPicture.value = true;
+    }
+    this.change();
+  }
+
+  /** Something is to be drawn anew. */
+  change(): void {
+    this.dirty = true;
+  }
+
+  put(surface: Surface): void {
+    this.remove(surface.object);
+    this.surfaces.set(surface.object, surface);
+    this.root.add(surface);
+    this.moved(surface);
+  }
+
+  remove(object: number): void {
+    const old = this.surfaces.get(object);
+    if (!old) return;
+    this.root.remove(old);
+    old.dispose();
+    this.surfaces.delete(object);
+    this.boxes.delete(object);
+    this.change();
+  }
+
+  /** A surface is elsewhere. */
+  moved(surface: Surface): void {
+    surface.updateMatrixWorld(true);
+    surface.geometry.boundingBox ?? surface.geometry.computeBoundingBox();
+    this.boxes.set(surface.object, surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld));
+    this.change();
+  }
+
+  /** Draws if there is something new; a tree of boxes is built on the way where one is missing. */
+  draw(): void {
+    if (!this.dirty) {
+      for (const surface of this.surfaces.values()) {
+        if (!surface.isReady) return void surface.tree;
+      }
+      return;
+    }
+    this.dirty = false;
+    this.renderer.render(this.scene, this.camera);
+    this.frames += 1;
+  }
+
+  /** Draws now, whatever has changed, for who counts frames or reads pixels. */
+  drawNow(): void {
+    this.dirty = true;
+    this.draw();
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.drawNow();
+  }
+
+  /** The first surface along a ray. `side` says which faces count. */
+  cast(origin: Vector3, direction: Vector3, far = Infinity, side: Side | null = null): Hit | null {
+    const ray = new Ray(origin, direction);
+    const local = new Ray();
+    const inverse = new Matrix4();
+    const entry = new Vector3();
+    let best: Hit | null = null;
+    for (const surface of this.surfaces.values()) {
+      if (!surface.visible) continue;
+      const box = this.boxes.get(surface.object)!;
+      const reach = best ? best.distance : far;
+      if (!box.containsPoint(origin)) {
+        if (!ray.intersectBox(box, entry) || entry.distanceTo(origin) > reach) continue;
+      }
+      inverse.copy(surface.matrixWorld).invert();
+      local.copy(ray).applyMatrix4(inverse);
+      const found = surface.tree.raycastFirst(local, side ?? surface.material.side);
+      if (!found || !found.face) continue;
+      const point = found.point.clone().applyMatrix4(surface.matrixWorld);
+      const distance = point.distanceTo(origin);
+      if (distance >= reach) continue;
+      const normal = found.face.normal.clone().transformDirection(surface.matrixWorld);
+      if (normal.dot(direction) > 0) normal.negate();
+      const triangle = found.faceIndex!;
+      best = { surface, point, normal, distance, triangle, uv: barycentric(surface, triangle, found.point) };
+    }
+    return best;
+  }
+
+  /** What is seen at a place of the canvas, −1..1 right and up. */
+  pick(x: number, y: number): Hit | null {
+    this.camera.updateMatrixWorld();
+    const origin = new Vector3().setFromMatrixPosition(this.camera.matrixWorld);
+    const direction = new Vector3(x, y, 0.5).unproject(this.camera).sub(origin).normalize();
+    return this.cast(origin, direction);
+  }
+
+  /** A place of the world on the canvas, CSS pixels; none if it lies behind. */
+  project(point: Vector3): Vector2 | null {
+    const p = point.clone().project(this.camera);
+    if (p.z > 1 || p.z < -1) return null;
+    return new Vector2((0.5 + 0.5 * p.x) * this.canvas.clientWidth, (0.5 - 0.5 * p.y) * this.canvas.clientHeight);
+  }
+
+  /** Looks from a place of the scene. */
+  look(place: CameraPlace): void {
+    const world = this.root.matrixWorld.clone().multiply(new Matrix4().fromArray(place.matrix));
+    world.decompose(this.camera.position, this.camera.quaternion, new Vector3());
+    this.camera.fov = (place.fov * 180) / Math.PI;
+    this.camera.updateProjectionMatrix();
+    this.camera.updateMatrixWorld();
+    this.change();
+  }
+
+  /** Where one looks from now. */
+  place(name: string): CameraPlace {
+    this.camera.updateMatrixWorld();
+    const matrix = this.root.matrixWorld.clone().invert().multiply(this.camera.matrixWorld);
+    return { name, matrix: matrix.toArray(), fov: (this.camera.fov * Math.PI) / 180 };
+  }
+
+  /** What the eye is exposed to. */
+  async metering(): Promise<Metered | null> {
+    if (this.isMetering) return null;
+    this.isMetering = true;
+    const mode = shared.mode.value;
+    const isolines = shared.isolines.value;
+    shared.mode.value = Mode.Meter;
+    shared.isolines.value = false;
+    this.root.remove(this.overlay);
+    this.tools.visible = false;
+    this.renderer.setRenderTarget(this.meter);
+    this.renderer.setClearColor(0, 0);
+    this.renderer.clear();
+    this.renderer.render(this.scene, this.camera);
+    this.renderer.setRenderTarget(null);
+    this.root.add(this.overlay);
+    this.tools.visible = true;
+    shared.mode.value = mode;
+    shared.isolines.value = isolines;
+    const pixels = new Float32Array(4 * METER[0] * METER[1]);
+    await this.renderer.readRenderTargetPixelsAsync(this.meter, 0, 0, METER[0], METER[1], pixels);
+    this.isMetering = false;
+    const seen: Metered = { luminance: [], illuminance: [] };
+    for (let i = 0; i < pixels.length; i += 4) {
+      if (pixels[i + 3] < 0.5) continue;
+      if (pixels[i] > 0) seen.luminance.push(pixels[i]);
+      if (pixels[i + 1] > 0) seen.illuminance.push(pixels[i + 1]);
+    }
+    return seen;
+  }
+
+  /** A point of the world in the scene's axes. */
+  toScene(point: Vector3): Vector3 {
+    return this.root.worldToLocal(point.clone());
+  }
+}
+
+function barycentric(surface: Surface, triangle: number, point: Vector3): [number, number] {
+  const [a, b, c] = corners(surface, triangle);
+  const [ab, ac, ap] = [b.sub(a), c.sub(a), point.clone().sub(a)];
+  const normal = ab.clone().cross(ac);
+  const scale = 1 / normal.lengthSq();
+  const v = ap.clone().cross(ac).dot(normal) * scale;
+  const w = ab.clone().cross(ap).dot(normal) * scale;
+  return [v, w];
+}
+
+/** Corners of a triangle in the surface's own frame. */
+export function corners(surface: Surface, triangle: number): [Vector3, Vector3, Vector3] {
+  const { position } = surface.geometry.attributes;
+  const index = surface.geometry.index!;
+  const at = (k: number) => new Vector3().fromBufferAttribute(position, index.getX(3 * triangle + k));
+  return [at(0), at(1), at(2)];
+}
+
+/** Frees what a thing holds in graphics memory. */
+export function discard(thing: Object3D): void {
+  thing.removeFromParent();
+  thing.traverse((part) => {
+    const { geometry, material } = part as Mesh;
+    geometry?.dispose();
+    for (const one of [material ?? []].flat()) one.dispose();
+  });
+}

@@ -1,0 +1,196 @@
+// A surface as the eye sees it, or as a meter does: light at vertices times reflectance at pixels.
+import {
+  BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, GLSL3, Mesh, ShaderMaterial, Texture, Vector3,
+  Matrix3, type IUniform,
+} from 'three';
+import { MeshBVH } from 'three-mesh-bvh';
+import { LEVELS, PALETTE } from './scale';
+import type { MeshFrame } from './wire';
+
+/** What a unit of the light attribute is, lx: half floats then reach beyond the sun. */
+export const UNIT = 16;
+
+/** What is drawn: light as it is displayed, false colours, or luminance as numbers for the exposure meter. */
+export enum Mode { Eye, Lux, Meter }
+
+/** The curve of crates/scene/src/display.rs, the colours of a scale, and lines of equal illuminance. */
+const DISPLAY = /* glsl */ `
+  const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+  const float KNEE = 0.5;
+  const float WHITE = 8.0;
+
+  vec3 toneMap(vec3 colour) {
+    float peak = max(colour.r, max(colour.g, colour.b));
+    if (peak <= KNEE) return colour;
+    float range = 1.0 - KNEE;
+    float end = 1.0 - exp(-(WHITE - KNEE) / range);
+    float mapped = KNEE + range * (1.0 - exp(-(peak - KNEE) / range)) / end;
+    float fade = clamp((peak - 1.0) / (WHITE - 1.0), 0.0, 1.0);
+    vec3 hue = colour / peak * mapped;
+    return min(hue + fade * (mapped - hue), 1.0);
+  }
+
+  vec3 srgb(vec3 x) {
+    x = clamp(x, 0.0, 1.0);
+    return mix(1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, 12.92 * x, vec3(lessThanEqual(x, vec3(0.0031308))));
+  }
+
+  // A quarter of a step of ordered dither hides the banding of 8 bits on smooth walls.
+  float dither() {
+    const float bayer[16] = float[16](0., 8., 2., 10., 12., 4., 14., 6., 3., 11., 1., 9., 15., 7., 13., 5.);
+    ivec2 p = ivec2(gl_FragCoord.xy) & 3;
+    return ((bayer[p.y * 4 + p.x] + 0.5) / 16.0 - 0.5) * 0.9 / 255.0;
+  }
+
+  vec3 display(vec3 luminance, float exposure) {
+    return srgb(toneMap(max(luminance, 0.0) * exposure)) + dither();
+  }
+`;
+
+const VERTEX = /* glsl */ `
+  in vec3 light;
+  out vec3 vLight;
+  out vec2 vUv;
+  uniform mat3 uvTransform;
+  void main() {
+    vLight = light * ${UNIT.toFixed(1)};
+    #ifdef TEXTURED
+      vUv = (uvTransform * vec3(uv, 1.0)).xy;
+    #endif
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  }
+`;
+
+const FRAGMENT = /* glsl */ `
+  precision highp float;
+  in vec3 vLight;
+  in vec2 vUv;
+  uniform int mode;
+  uniform float exposure;
+  uniform vec3 tint;
+  uniform vec3 emission;
+  uniform float emissionShown;
+  uniform sampler2D map;
+  uniform vec2 range;
+  uniform vec3 palette[${PALETTE.length}];
+  uniform float levels[${LEVELS}];
+  uniform int levelCount;
+  uniform bool isolines;
+  out vec4 outColour;
+  ${DISPLAY}
+
+  vec3 falseColour(float lux) {
+    float at = clamp((log(max(lux, 1e-9)) - log(range.x)) / (log(range.y) - log(range.x)), 0.0, 1.0) * ${(PALETTE.length - 1).toFixed(1)};
+    int i = min(int(at), ${PALETTE.length - 2});
+    return mix(palette[i], palette[i + 1], at - float(i));
+  }
+
+  // How much of the pixel a line of equal illuminance covers.
+  float line(float lux) {
+    float l = log(max(lux, 1e-9));
+    float slope = max(fwidth(l), 1e-6);
+    float nearest = 1e9;
+    for (int i = 0; i < ${LEVELS}; i++) {
+      if (i < levelCount) nearest = min(nearest, abs(l - log(levels[i])) / slope);
+    }
+    // Where light hardly changes a line would be an area.
+    return slope < 1e-4 ? 0.0 : 1.0 - smoothstep(0.5, 1.3, nearest);
+  }
+
+  void main() {
+    vec3 reflectance = tint;
+    #ifdef TEXTURED
+      reflectance *= texture(map, vUv).rgb;
+    #endif
+    float lux = dot(vLight, LUMINANCE);
+    vec3 luminance = min(reflectance, 0.99) * vLight * 0.31830988618 + emission * emissionShown;
+    if (mode == ${Mode.Meter}) {
+      outColour = vec4(dot(luminance, LUMINANCE), lux, 0.0, 1.0);
+      return;
+    }
+    vec3 colour = mode == ${Mode.Lux} ? falseColour(lux) : display(luminance, exposure);
+    if (isolines) colour = mix(colour, mode == ${Mode.Lux} ? vec3(0.02) : vec3(1.0, 0.75, 0.3), 0.8 * line(lux));
+    outColour = vec4(colour, 1.0);
+  }
+`;
+
+/** Values that all surfaces share. */
+export const shared = {
+  mode: { value: Mode.Eye },
+  exposure: { value: 1 },
+  emissionShown: { value: 1 },
+  range: { value: [10, 1000] },
+  palette: { value: PALETTE.map((c) => new Vector3(...c)) },
+  levels: { value: new Array<number>(LEVELS).fill(1) },
+  levelCount: { value: 0 },
+  isolines: { value: false },
+} satisfies Record<string, IUniform>;
+
+/** An object on the stage. */
+export class Surface extends Mesh<BufferGeometry, ShaderMaterial> {
+  readonly light: Float16BufferAttribute;
+  /** Its tree of boxes, once a ray needed it. */
+  private boxes: MeshBVH | null = null;
+
+  constructor(readonly object: number, frame: MeshFrame) {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(frame.positions, 3));
+    if (frame.uvs) geometry.setAttribute('uv', new BufferAttribute(frame.uvs, 2));
+    geometry.setIndex(new BufferAttribute(frame.indices, 1));
+    const light = new Float16BufferAttribute(new Uint16Array(frame.positions.length), 3);
+    geometry.setAttribute('light', light);
+    const material = new ShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader: VERTEX,
+      fragmentShader: FRAGMENT,
+      side: FrontSide,
+      defines: {},
+      uniforms: {
+        ...shared,
+        tint: { value: new Vector3(1, 1, 1) },
+        emission: { value: new Vector3() },
+        map: { value: null },
+        uvTransform: { value: new Matrix3() },
+      },
+    });
+    super(geometry, material);
+    this.light = light;
+    this.matrixAutoUpdate = false;
+  }
+
+  /** Light has come. Two bytes a number, and only what changed goes to the graphics memory. */
+  shine(first: number, values: Uint16Array): void {
+    (this.light.array as Uint16Array).set(values, 3 * first);
+    this.light.addUpdateRange(3 * first, values.length);
+    this.light.needsUpdate = true;
+  }
+
+  /** A picture, or none. */
+  dress(texture: Texture | null, transform: number[]): void {
+    const had = 'TEXTURED' in this.material.defines;
+    this.material.uniforms.map.value = texture;
+    const [a, b, c, d, x, y] = transform;
+    this.material.uniforms.uvTransform.value.set(a, c, x, b, d, y, 0, 0, 1);
+    if (texture) this.material.defines.TEXTURED = '';
+    else delete this.material.defines.TEXTURED;
+    if (had !== (texture !== null)) this.material.needsUpdate = true;
+  }
+
+  /** Whether its tree of boxes is there. */
+  get isReady(): boolean {
+    return this.boxes !== null;
+  }
+
+  /** Its tree of boxes, built where it is missing. The order of triangles stays. */
+  get tree(): MeshBVH {
+    this.boxes ??= new MeshBVH(this.geometry, { indirect: true });
+    return this.boxes;
+  }
+
+  dispose(): void {
+    this.geometry.dispose();
+    this.material.dispose();
+  }
+}
+
+export { DISPLAY };

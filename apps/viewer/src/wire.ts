@@ -1,0 +1,260 @@
+// What page and server say to each other. JSON in both directions; triangles and light come as binary frames.
+
+/** The scene as a whole. */
+export interface SceneNotice {
+  kind: 'scene';
+  name: string;
+  version: string;
+  up: [number, number, number];
+  low: [number, number, number];
+  high: [number, number, number];
+  cameras: CameraPlace[];
+  /** Luminance of the sky, cd/m², a small picture: rows from the zenith down, columns by azimuth about +Y; none if black. */
+  sky: { width: number; height: number; luminance: number[] } | null;
+}
+
+/** A place to look from, in the scene's axes; matrix by columns, looking along −Z. */
+export interface CameraPlace {
+  name: string;
+  matrix: number[];
+  /** Vertical angle of view, radians. */
+  fov: number;
+}
+
+/** A picture on an object. */
+export interface TextureUse {
+  index: number;
+  /** Columns of the affine map of texture coordinates. */
+  transform: number[];
+  wrap: ['repeat' | 'mirror' | 'clamp', 'repeat' | 'mirror' | 'clamp'];
+  nearest: boolean;
+}
+
+/** An object. */
+export interface ObjectNotice {
+  kind: 'object';
+  id: number;
+  name: string;
+  /** Objects of one group are one thing to people. */
+  group: number;
+  /** From its place in the file to where it is now. */
+  matrix: number[];
+  /** Mean reflectance, for people. */
+  reflectance: [number, number, number];
+  /** What the picture, if any, is multiplied with. */
+  tint: [number, number, number];
+  texture: TextureUse | null;
+  /** cd/m². */
+  emission: [number, number, number];
+  deleted: boolean;
+  movable: boolean;
+}
+
+/** A light. */
+export interface LightNotice {
+  kind: 'light';
+  id: number;
+  name: string;
+  type: 'object' | 'point' | 'spot' | 'directional' | 'sky';
+  dimming: number;
+  colour: [number, number, number];
+  /** From its place in the file to where it is now. */
+  matrix: number[];
+  position: number[] | null;
+  object: number | null;
+  deleted: boolean;
+}
+
+/** How far the solution is. */
+export interface StatusNotice {
+  kind: 'status';
+  doing: string;
+  rays: number;
+  most_rays: number;
+  /** Relative error of irradiance, estimated; none before there is one. */
+  error: number | null;
+  seconds: number;
+  /** Seconds to the target, about. */
+  left: number | null;
+  rays_traced: number;
+  elements: number;
+  /** Milliseconds that the last edit took to its first complete update. */
+  latency: number | null;
+  is_done: boolean;
+  /** Edits so far, of all pages. */
+  edits: number;
+}
+
+/** What stands at a point. */
+export interface ProbeAnswer {
+  illuminance: number;
+  irradiance: [number, number, number];
+  reflectance: [number, number, number];
+  radiosity: [number, number, number];
+  direct: number;
+  sources: { name: string; share: number }[];
+}
+
+/** Everything that the server says in JSON. */
+export type Notice =
+  | SceneNotice
+  | ObjectNotice
+  | LightNotice
+  | StatusNotice
+  | { kind: 'bookmarks'; cameras: CameraPlace[] }
+  | { kind: 'history'; undo: string | null; redo: string | null }
+  | { kind: 'caught_up' }
+  | { kind: 'probe'; question: number; answer: ProbeAnswer | null }
+  | { kind: 'rays'; question: number; rays: number[][][] }
+  | { kind: 'refused'; message: string };
+
+/** What a layer shows. */
+export type Layer = 'total' | 'direct' | 'indirect' | 'error' | { bounce: number } | { light: number };
+
+/** A change of the scene. */
+export type Edit =
+  | { light: { light: number; dimming: number; colour: number[] } }
+  | { reflectance: { object: number; reflectance: number[] } }
+  | { move: { object: number; matrix: number[] } }
+  | { move_light: { light: number; matrix: number[] } }
+  | { copy: { object: number; matrix: number[] } }
+  | { delete: { object: number } }
+  | { several: Edit[] };
+
+/** Everything that the page says. */
+export type Request =
+  | { kind: 'edit'; edit: Edit; gesture?: number }
+  | { kind: 'undo' }
+  | { kind: 'redo' }
+  | { kind: 'layer'; layer: Layer; epoch: number }
+  | { kind: 'probe'; question: number; object: number; triangle: number; uv: [number, number] }
+  | { kind: 'rays'; question: number; object: number; triangle: number }
+  | { kind: 'bookmark'; camera: CameraPlace }
+  | { kind: 'forget'; name: string };
+
+/** Triangles of an object. */
+export interface MeshFrame {
+  object: number;
+  positions: Float32Array;
+  uvs: Float32Array | null;
+  indices: Uint32Array;
+}
+
+/** Light of some vertices, three half floats each in units of 16 lx. */
+export interface LightFrame {
+  object: number;
+  first: number;
+  values: Uint16Array;
+}
+
+const MESH = 1;
+const LIGHT = 2;
+const HAS_UVS = 1;
+
+function readMesh(buffer: ArrayBuffer): MeshFrame {
+  const [, object, vertices, triangles, flags] = new Uint32Array(buffer, 0, 5);
+  let at = 20;
+  const floats = (count: number) => {
+    const values = new Float32Array(buffer, at, count);
+    at += 4 * count;
+    return values;
+  };
+  const positions = floats(3 * vertices);
+  const uvs = flags & HAS_UVS ? floats(2 * vertices) : null;
+  return { object, positions, uvs, indices: new Uint32Array(buffer, at, 3 * triangles) };
+}
+
+function* readLight(buffer: ArrayBuffer): Generator<LightFrame> {
+  const view = new DataView(buffer);
+  let at = 8;
+  while (at < buffer.byteLength) {
+    const [object, first, count] = [0, 4, 8].map((offset) => view.getUint32(at + offset, true));
+    yield { object, first, values: new Uint16Array(buffer, at + 12, 3 * count) };
+    at += 12 + 4 * Math.ceil((6 * count) / 4);
+  }
+}
+
+/** Who listens to a connection. */
+export interface Listener {
+  notice(notice: Notice): void;
+  mesh(frame: MeshFrame): void;
+  light(frame: LightFrame): void;
+  connected(is: boolean): void;
+}
+
+/** Milliseconds before a lost connection is tried again: first, and at most. */
+const PATIENCE = [250, 4000];
+
+/** The socket, opened again when it closes. */
+export class Connection {
+  private socket: WebSocket | null = null;
+  private patience = PATIENCE[0];
+  private layer: Layer = 'total';
+  private epoch = 0;
+  /** Bytes received, for those who measure. */
+  received = 0;
+
+  constructor(private listener: Listener) {
+    this.open();
+  }
+
+  get isOpen(): boolean {
+    return this.socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** Says something; nothing is kept for later, since the scene may have changed by then. */
+  send(request: Request): boolean {
+    if (!this.isOpen) return false;
+    this.socket!.send(JSON.stringify(request));
+    return true;
+  }
+
+  /** Looks at another layer: its light is sent from now on. */
+  look(layer: Layer): void {
+    this.layer = layer;
+    this.epoch += 1;
+    this.send({ kind: 'layer', layer, epoch: this.epoch });
+  }
+
+  /** Closes as a broken line would. */
+  drop(): void {
+    this.socket?.close();
+  }
+
+  /** Sends text as it is, for tests of what is malformed. */
+  sendRaw(text: string): void {
+    this.socket?.send(text);
+  }
+
+  private open(): void {
+    const address = new URL('socket', location.href);
+    address.protocol = 'ws:';
+    const socket = new WebSocket(address);
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    socket.onopen = () => {
+      this.patience = PATIENCE[0];
+      this.listener.connected(true);
+      this.look(this.layer);
+    };
+    socket.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => this.receive(data);
+    socket.onclose = () => {
+      this.listener.connected(false);
+      setTimeout(() => this.open(), this.patience);
+      this.patience = Math.min(2 * this.patience, PATIENCE[1]);
+    };
+  }
+
+  private receive(data: string | ArrayBuffer): void {
+    if (typeof data === 'string') {
+      this.received += data.length;
+      this.listener.notice(JSON.parse(data) as Notice);
+      return;
+    }
+    this.received += data.byteLength;
+    const [kind, epoch] = new Uint32Array(data, 0, 2);
+    if (kind === MESH) this.listener.mesh(readMesh(data));
+    // Light of a layer that was looked at before is still under way when another is chosen.
+    if (kind === LIGHT && epoch === this.epoch) for (const frame of readLight(data)) this.listener.light(frame);
+  }
+}
