@@ -9,8 +9,8 @@ mod licence;
 mod rule;
 
 use crate::fault::Fault;
+use crate::root;
 use serde_json::Value;
-use std::path::PathBuf;
 use std::process::Command;
 use std::time::Instant;
 
@@ -84,15 +84,6 @@ fn cargo_command() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
     command
-}
-
-/// Root of the workspace that `cargo run` was called in. Not where this was compiled: two checkouts that share a target
-/// folder share the program, and the one would be judged in place of the other.
-fn root() -> PathBuf {
-    let manifest = std::env::var_os("CARGO_MANIFEST_DIR");
-    let mut path = manifest.map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
-    path.pop();
-    path
 }
 
 /// Text of a field, if it is there.

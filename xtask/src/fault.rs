@@ -15,6 +15,8 @@ pub enum Fault {
     Picture(#[from] png::EncodingError),
     #[error("the file would need {0} bytes; GLB ends at 4 GiB, ask for fewer triangles")]
     TooLarge(u64),
+    #[error("viewer: {0}")]
+    Viewer(String),
     #[error("ci: {step} FAILED after {seconds:.1} s\n{what}")]
     Check { step: &'static str, seconds: f64, what: String },
 }

@@ -16,6 +16,7 @@ mod output;
 mod progress;
 mod render;
 mod report;
+mod view;
 mod views;
 
 use clap::error::ContextKind;
@@ -68,6 +69,8 @@ enum Verb {
     Factors(factors::Arguments),
     /// Form-factor methods and solvers side by side: time, memory, error, as tables and plots.
     Compare(compare::Arguments),
+    /// Walk through a scene in the browser while it is lit, and change it.
+    View(view::Arguments),
     /// Every fault of a scene, and what is in it.
     Check(check::Arguments),
 }
@@ -119,7 +122,9 @@ fn work(cli: &Cli, progress: &progress::Progress) -> Result<(), Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
         pool.build_global().map_err(|error| Failure::input(format!("--threads {threads}: {error}")))?;
     }
-    if let Err(error) = progress.listen_for_interrupts() {
+    // `view` has nothing to save and ends in its own way.
+    let listens = matches!(cli.verb, Verb::View(_));
+    if let Err(error) = if listens { Ok(()) } else { progress.listen_for_interrupts() } {
         output::complain(&format!("warning: Ctrl-C may leave temporary files: {error}"));
     }
     match &cli.verb {
@@ -128,6 +133,7 @@ fn work(cli: &Cli, progress: &progress::Progress) -> Result<(), Failure> {
         Verb::Render(arguments) => render::run(arguments, &cli.global, progress),
         Verb::Factors(arguments) => factors::run(arguments, &cli.global, progress),
         Verb::Compare(arguments) => compare::run(arguments, &cli.global, progress),
+        Verb::View(arguments) => view::run(arguments, &cli.global, progress),
         Verb::Check(arguments) => check::run(arguments, &cli.global),
     }
 }

@@ -1,5 +1,5 @@
 // All that the page knows, and what can be done with it. Panels and keys call the verbs here and listen to topics.
-import { ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
+import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
 import { grid, type Grid } from './grid';
@@ -167,12 +167,17 @@ export class App {
     surface.material.uniforms.tint.value.fromArray(object.tint);
     surface.material.uniforms.emission.value.fromArray(object.emission);
     surface.dress(object.texture ? this.texture(object.texture) : null, object.texture?.transform ?? [1, 0, 0, 1, 0, 0]);
-    if (!this.gizmo.isDragging || this.selected !== id) {
+    // What is dragged here is ahead of what the server has seen.
+    if (!this.gizmo.isDragging || !this.group().includes(surface)) {
       surface.matrix.fromArray(object.matrix);
       this.stage.moved(surface);
+      this.marks.follow(surface);
     }
     if (object.deleted && this.selected === id) this.select(null);
-    else if (this.selected === id) this.marks.outline(surface);
+    else if (this.group().includes(surface)) {
+      this.marks.outline(this.group());
+      if (!this.gizmo.isDragging) this.gizmo.place();
+    }
     if (this.edges) this.marks.edges(this.stage.surfaces);
     this.stage.change();
   }
@@ -253,65 +258,94 @@ export class App {
     this.edit({ reflectance: { object, reflectance } }, gesture);
   }
 
-  /** Moves a thing; `matrix` in the scene's axes. */
-  move(object: number, matrix: Matrix4, gesture?: number): void {
-    const known = this.objects.get(object);
-    const surface = this.stage.surfaces.get(object);
-    if (!known || !surface) return;
-    known.matrix = matrix.toArray();
-    surface.matrix.copy(matrix);
-    this.stage.moved(surface);
-    this.marks.follow(surface);
-    this.edit({ move: { object, matrix: known.matrix } }, gesture);
+  /** The surfaces of what is selected: all that belong to one thing. */
+  group(): Surface[] {
+    const selected = this.selected === null ? undefined : this.objects.get(this.selected);
+    if (!selected) return [];
+    const members = [...this.objects.values()].filter((object) => object.group === selected.group && !object.deleted);
+    return members.flatMap((object) => this.stage.surfaces.get(object.id) ?? []);
+  }
+
+  /** Whether what is selected can be moved. */
+  get isMovable(): boolean {
+    const group = this.group();
+    return group.length > 0 && group.every((surface) => this.objects.get(surface.object)!.movable);
+  }
+
+  /** Places of what is selected after a motion of the world. */
+  private placed(motion: Matrix4, from = (surface: Surface) => surface.matrix): [Surface, Matrix4][] {
+    const { matrixWorld } = this.stage.root;
+    const inScene = matrixWorld.clone().invert().multiply(motion).multiply(matrixWorld);
+    return this.group().map((surface) => [surface, inScene.clone().multiply(from(surface))]);
+  }
+
+  /** Moves what is selected by a motion of the world, from where it is or from given places. */
+  move(motion: Matrix4, gesture?: number, from?: (surface: Surface) => Matrix4): void {
+    const edits: Edit[] = [];
+    for (const [surface, matrix] of this.placed(motion, from)) {
+      const object = this.objects.get(surface.object)!;
+      object.matrix = matrix.toArray();
+      surface.matrix.copy(matrix);
+      this.stage.moved(surface);
+      this.marks.follow(surface);
+      edits.push({ move: { object: object.id, matrix: object.matrix } });
+    }
+    if (edits.length === 0) return;
+    this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
     this.tell('selection');
   }
 
   /** Moves by a way and turns by an angle about the zenith through the middle of the thing. */
   nudge(way: Vector3, angle: number): void {
-    const surface = this.selected === null ? undefined : this.stage.surfaces.get(this.selected);
-    if (!surface || !this.objects.get(surface.object)?.movable) return;
-    const { root } = this.stage;
-    const middle = this.middle(surface);
-    const world = new Matrix4().makeTranslation(way.clone().add(middle))
+    if (!this.isMovable) return;
+    const middle = this.middle();
+    this.move(new Matrix4().makeTranslation(way.clone().add(middle))
       .multiply(new Matrix4().makeRotationY(angle))
-      .multiply(new Matrix4().makeTranslation(middle.clone().negate()))
-      .multiply(surface.matrixWorld);
-    this.move(surface.object, root.matrixWorld.clone().invert().multiply(world));
+      .multiply(new Matrix4().makeTranslation(middle.clone().negate())));
     this.gizmo.place();
   }
 
-  /** The middle of a thing's floor plan, at its foot, in the world. */
-  middle(surface: Surface): Vector3 {
-    const box = surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld);
+  private box(): Box3 {
+    const box = new Box3();
+    for (const surface of this.group()) box.union(surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld));
+    return box;
+  }
+
+  /** The middle of the floor plan of what is selected, at its foot, in the world. */
+  middle(): Vector3 {
+    const box = this.box();
     const middle = box.getCenter(new Vector3());
     middle.y = box.min.y;
     return middle;
   }
 
   duplicate(): void {
-    const surface = this.selected === null ? undefined : this.stage.surfaces.get(this.selected);
-    if (!surface) return;
-    const box = surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld);
+    if (this.group().length === 0) return;
     // Beside the first, to the right of who looks, so that one sees that there are two.
     const right = new Vector3(1, 0, 0).applyQuaternion(this.stage.camera.quaternion).setY(0).normalize();
-    const size = box.getSize(new Vector3());
+    const size = this.box().getSize(new Vector3());
     const way = right.multiplyScalar(0.6 * Math.max(size.x, size.z));
-    const world = new Matrix4().makeTranslation(way).multiply(surface.matrixWorld);
-    const matrix = this.stage.root.matrixWorld.clone().invert().multiply(world);
-    this.edit({ copy: { object: surface.object, matrix: matrix.toArray() } });
-    this.say('Duplicated. The copy stands beside it.');
+    const copies: Edit[] = this.placed(new Matrix4().makeTranslation(way))
+      .map(([surface, matrix]) => ({ copy: { object: surface.object, matrix: matrix.toArray() } }));
+    this.edit(copies.length === 1 ? copies[0] : { several: copies });
+    this.say('Duplicated: the copy stands beside it.');
   }
 
   delete(): void {
-    if (this.selected === null) return;
-    this.edit({ delete: { object: this.selected } });
+    const deletions: Edit[] = this.group().map((surface) => ({ delete: { object: surface.object } }));
+    if (deletions.length > 0) this.edit(deletions.length === 1 ? deletions[0] : { several: deletions });
+  }
+
+  /** Turns lights on or off together. */
+  setLights(dimming: number): void {
+    const lights = [...this.lights.values()].filter((light) => !light.deleted);
+    this.edit({ several: lights.map(({ id, colour }) => ({ light: { light: id, dimming, colour } })) });
   }
 
   select(object: number | null): void {
     this.selected = object;
     this.selectedLight = null;
-    const surface = object === null ? undefined : this.stage.surfaces.get(object);
-    this.marks.outline(surface ?? null);
+    this.marks.outline(this.group());
     this.gizmo.place();
     this.tell('selection');
   }
@@ -345,8 +379,8 @@ export class App {
     const { surface, triangle, uv } = this.probed.hit;
     if (!this.stage.surfaces.has(surface.object)) return;
     this.question += 1;
-    const about = { question: this.question, object: surface.object, triangle, uv };
-    this.connection.send({ kind: 'probe', ...about });
+    const about = { question: this.question, object: surface.object, triangle };
+    this.connection.send({ kind: 'probe', ...about, uv });
     if (this.raysShown) this.connection.send({ kind: 'rays', ...about });
   }
 

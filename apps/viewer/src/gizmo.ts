@@ -2,13 +2,16 @@
 import { Matrix4, Object3D, Quaternion, Vector3 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { App } from './app';
+import { ACCENT } from './marks';
+import type { Surface } from './surface';
 
 export class Gizmo {
   private controls: TransformControls;
   /** What the handles hold: a stand-in at the foot of the thing, in the world's axes. */
   private handle = new Object3D();
   private start = new Matrix4();
-  private original = new Matrix4();
+  private places = new Map<Surface, Matrix4>();
+  private light: { matrix: number[]; position: number[] } | null = null;
   private gesture = 0;
   isDragging = false;
 
@@ -17,6 +20,7 @@ export class Gizmo {
     this.controls = new TransformControls(stage.camera, stage.canvas);
     this.controls.setSize(0.8);
     this.controls.setSpace('world');
+    this.controls.setColors(0xd9695f, 0x74b566, 0x5b97d8, ACCENT);
     stage.tools.add(this.handle, this.controls.getHelper());
     this.controls.addEventListener('change', () => stage.change());
     this.controls.addEventListener('dragging-changed', (event) => {
@@ -48,58 +52,50 @@ export class Gizmo {
   /** Puts the handles to what is selected. */
   place(): void {
     const { app } = this;
-    const matrix = this.matrix();
-    if (!matrix) {
+    const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
+    if (light?.position) this.handle.position.copy(app.stage.root.localToWorld(new Vector3().fromArray(light.position)));
+    else if (app.isMovable) this.handle.position.copy(app.middle());
+    else {
       this.controls.detach();
       app.stage.change();
       return;
     }
-    const surface = app.selected === null ? undefined : app.stage.surfaces.get(app.selected);
     this.handle.quaternion.identity();
-    this.handle.position.copy(surface ? app.middle(surface) : new Vector3().setFromMatrixPosition(matrix));
     this.handle.updateMatrixWorld();
     this.controls.attach(this.handle);
     app.stage.change();
   }
 
-  /** Of what is selected, in the world; none if it stays where it is. */
-  private matrix(): Matrix4 | null {
-    const { app } = this;
-    const { root } = app.stage;
-    if (app.selectedLight !== null) {
-      const light = app.lights.get(app.selectedLight);
-      return light?.matrix ? root.matrixWorld.clone().multiply(new Matrix4().fromArray(light.matrix)) : null;
-    }
-    const object = app.selected === null ? undefined : app.objects.get(app.selected);
-    if (!object?.movable || object.deleted) return null;
-    return root.matrixWorld.clone().multiply(new Matrix4().fromArray(object.matrix));
-  }
-
   private begin(): void {
-    this.gesture = this.app.nextGesture();
+    const { app } = this;
+    this.gesture = app.nextGesture();
     this.handle.updateMatrixWorld();
     this.start.copy(this.handle.matrixWorld);
-    this.original.copy(this.matrix() ?? new Matrix4());
+    this.places = new Map(app.group().map((surface) => [surface, surface.matrix.clone()]));
+    const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
+    this.light = light ? { matrix: light.matrix, position: light.position! } : null;
   }
 
   private drag(): void {
     if (!this.isDragging) return;
     const { app } = this;
     this.handle.updateMatrixWorld();
-    const world = this.handle.matrixWorld.clone().multiply(this.start.clone().invert()).multiply(this.original);
-    const matrix = app.stage.root.matrixWorld.clone().invert().multiply(world);
-    if (app.selectedLight !== null) {
-      const light = app.lights.get(app.selectedLight)!;
-      light.matrix = matrix.toArray();
+    const motion = this.handle.matrixWorld.clone().multiply(this.start.clone().invert());
+    const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
+    if (light && this.light) {
+      const { matrixWorld } = app.stage.root;
+      const inScene = matrixWorld.clone().invert().multiply(motion).multiply(matrixWorld);
+      light.matrix = inScene.clone().multiply(new Matrix4().fromArray(this.light.matrix)).toArray();
+      light.position = new Vector3().fromArray(this.light.position).applyMatrix4(inScene).toArray();
       app.marks.light(light);
       app.edit({ move_light: { light: light.id, matrix: light.matrix } }, this.gesture);
-    } else if (app.selected !== null) {
-      app.move(app.selected, matrix, this.gesture);
+    } else {
+      app.move(motion, this.gesture, (surface) => this.places.get(surface) ?? surface.matrix);
     }
   }
 }
 
-/** Place and turn of a thing as people write them: metres, and degrees about the zenith. */
+/** By how much a thing was turned about the zenith, degrees. */
 export function turnOf(matrix: number[], up: Vector3): number {
   const q = new Quaternion();
   new Matrix4().fromArray(matrix).decompose(new Vector3(), q, new Vector3());

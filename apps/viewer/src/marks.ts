@@ -1,6 +1,6 @@
 // What is drawn over the scene: the probe, the outline of what is selected, edges of elements, rays, a grid, lights without area.
 import {
-  BoxHelper, BufferAttribute, BufferGeometry, CanvasTexture, Color, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Matrix4, Mesh,
+  BoxHelper, BufferAttribute, BufferGeometry, CanvasTexture, Color, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh,
   MeshBasicMaterial, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, Vector3, WireframeGeometry, type Object3D,
 } from 'three';
 import type { Grid } from './grid';
@@ -14,7 +14,7 @@ export const ACCENT = 0xe8b04a;
 const OUTLINED = 60_000;
 
 export class Marks {
-  private outlined: Object3D | null = null;
+  private outlined = new Map<Surface, Object3D>();
   private wires = new Map<number, LineSegments>();
   private ring: Group | null = null;
   private lines: LineSegments | null = null;
@@ -24,31 +24,38 @@ export class Marks {
 
   constructor(private stage: Stage) {}
 
-  /** The edges of the thing that is selected. */
-  outline(surface: Surface | null): void {
-    if (this.outlined) discard(this.outlined);
-    this.outlined = null;
-    if (surface) {
-      const isLarge = surface.geometry.index!.count / 3 > OUTLINED;
-      if (isLarge) {
-        this.outlined = new BoxHelper(surface, ACCENT);
-        this.stage.tools.add(this.outlined);
-      } else {
-        const lines = new LineSegments(new EdgesGeometry(surface.geometry, 20), new LineBasicMaterial({ color: ACCENT, transparent: true, opacity: 0.9, depthTest: false }));
-        lines.matrixAutoUpdate = false;
-        lines.matrix.copy(surface.matrix);
-        lines.renderOrder = 3;
-        this.outlined = lines;
-        this.stage.overlay.add(lines);
-      }
+  /** The edges of what is selected. */
+  outline(surfaces: Surface[]): void {
+    const same = surfaces.length === this.outlined.size && surfaces.every((surface) => this.outlined.has(surface));
+    if (!same) {
+      for (const outline of this.outlined.values()) discard(outline);
+      this.outlined.clear();
+      for (const surface of surfaces) this.outlined.set(surface, this.outlineOf(surface));
     }
+    surfaces.forEach((surface) => this.follow(surface));
     this.stage.change();
   }
 
-  /** The thing that is selected has moved. */
+  private outlineOf(surface: Surface): Object3D {
+    if (surface.geometry.index!.count / 3 > OUTLINED) {
+      const box = new BoxHelper(surface, ACCENT);
+      this.stage.tools.add(box);
+      return box;
+    }
+    const material = new LineBasicMaterial({ color: ACCENT, transparent: true, opacity: 0.9, depthTest: false });
+    const lines = new LineSegments(new EdgesGeometry(surface.geometry, 20), material);
+    lines.matrixAutoUpdate = false;
+    lines.renderOrder = 3;
+    this.stage.overlay.add(lines);
+    return lines;
+  }
+
+  /** A surface has moved. */
   follow(surface: Surface): void {
-    this.outlined?.matrix.copy(surface.matrix);
-    if (this.outlined) this.outlined.matrixWorldNeedsUpdate = true;
+    const outline = this.outlined.get(surface);
+    if (outline instanceof BoxHelper) outline.update();
+    else outline?.matrix.copy(surface.matrix);
+    if (outline) outline.matrixWorldNeedsUpdate = true;
     const wires = this.wires.get(surface.object);
     wires?.matrix.copy(surface.matrix);
     if (wires) wires.matrixWorldNeedsUpdate = true;
@@ -105,7 +112,7 @@ export class Marks {
   }
 
   /** Rays of an element, from origin to end, in the scene's axes. */
-  rays(rays: [number[], number[]][]): void {
+  rays(rays: number[][][]): void {
     if (this.lines) discard(this.lines);
     this.lines = null;
     if (rays.length > 0) {
@@ -135,7 +142,7 @@ export class Marks {
 
   /** A light without area. */
   light(light: LightNotice): void {
-    if (!light.matrix || light.object !== null || light.type === 'sky') return;
+    if (!light.position || light.object !== null || light.type === 'sky') return;
     let sprite = this.lamps.get(light.id);
     if (!sprite) {
       this.lampPicture ??= lampPicture();
@@ -144,7 +151,8 @@ export class Marks {
       this.lamps.set(light.id, sprite);
       this.stage.overlay.add(sprite);
     }
-    sprite.position.copy(new Vector3().setFromMatrixPosition(new Matrix4().fromArray(light.matrix)));
+    sprite.position.fromArray(light.position);
+    sprite.visible = !light.deleted;
     sprite.material.opacity = light.dimming > 0 ? 1 : 0.45;
     this.stage.change();
   }

@@ -85,14 +85,22 @@ export interface StatusNotice {
   edits: number;
 }
 
+/** A share of the illuminance of a place. */
+export interface Share {
+  name: string;
+  share: number;
+}
+
 /** What stands at a point. */
 export interface ProbeAnswer {
   illuminance: number;
   irradiance: [number, number, number];
   reflectance: [number, number, number];
   radiosity: [number, number, number];
-  direct: number;
-  sources: { name: string; share: number }[];
+  /** What each light brings, its reflections too. */
+  lights: Share[];
+  /** From where it arrives: straight from lights, or from surfaces that reflect it. */
+  surfaces: Share[];
 }
 
 /** Everything that the server says in JSON. */

@@ -154,14 +154,15 @@ pub struct ProbeAnswer {
     pub irradiance: Bands,
     pub reflectance: Bands,
     pub radiosity: Bands,
-    /// Share of the illuminance that was never reflected.
-    pub direct: f32,
-    pub sources: Vec<SourceShare>,
+    /// What each light brings, its reflections too.
+    pub lights: Vec<Share>,
+    /// From where it arrives: straight from lights, or from surfaces that reflect it.
+    pub surfaces: Vec<Share>,
 }
 
-/// What part of the light comes from where.
+/// A share of the illuminance of a place.
 #[derive(Clone, Debug, Serialize)]
-pub struct SourceShare {
+pub struct Share {
     pub name: String,
     pub share: f32,
 }

@@ -14,6 +14,7 @@ mod factors;
 mod measure;
 mod render;
 mod runs;
+mod view;
 
 /// Options of a bake that takes a moment.
 const COARSE: [&str; 6] = ["--error", "20%", "--element-size", "0.15", "--size", "48x48"];

@@ -10,12 +10,8 @@ export function lightsPanel(app: App): HTMLElement {
   const rows = new Map<number, (light: LightNotice) => void>();
   const none = el('p', { class: 'quiet' }, 'This scene has no light.');
   const all = el('div', { class: 'row' },
-    button('All on', () => switchAll(1), { title: 'Turn all lights on' }),
-    button('All off', () => switchAll(0), { title: 'Turn all lights off' }));
-  const switchAll = (dimming: number) => {
-    const gesture = app.nextGesture();
-    for (const light of app.lights.values()) app.setLight(light, { dimming }, gesture);
-  };
+    button('All on', () => app.setLights(1), { title: 'Turn all lights on' }),
+    button('All off', () => app.setLights(0), { title: 'Turn all lights off' }));
   app.on('lights', () => {
     for (const light of app.lights.values()) {
       if (!rows.has(light.id)) {
@@ -65,6 +61,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     set(now) {
       if (now.dimming > 0) last = now.dimming;
       on.checked = now.dimming > 0;
+      element.hidden = now.deleted;
       element.classList.toggle('off', now.dimming === 0);
       dimming.set(100 * now.dimming);
       const peak = Math.max(...now.colour, 1e-9);

@@ -1,14 +1,16 @@
 // What is measured: at a point, and on a grid.
 import type { App } from '../app';
 import { readable } from '../scale';
+import type { Share } from '../wire';
 import { button, el, fact, hex, section } from './parts';
 
 export function meterPanel(app: App): HTMLElement {
   const none = el('p', { class: 'quiet' }, 'Click a surface, or press Enter for what is under the cross.');
   const lux = el('div', { class: 'big', id: 'lux', 'aria-live': 'polite' });
   const facts = el('div', { class: 'facts' });
-  const sources = el('div', { class: 'bars' });
-  const body = el('div', {}, lux, facts, el('h3', {}, 'Where its light comes from'), sources);
+  const lights = el('div', { class: 'bars' });
+  const surfaces = el('div', { class: 'bars' });
+  const body = el('div', {}, lux, facts, el('h3', {}, 'From which light, reflections included'), lights, el('h3', {}, 'From where it arrives'), surfaces);
   app.on('probe', () => {
     const { probed } = app;
     body.hidden = !probed;
@@ -26,13 +28,16 @@ export function meterPanel(app: App): HTMLElement {
       fact('Reflectance', el('span', {}, el('i', { class: 'swatch', style: `background:${hex(answer.reflectance)}` }), `${(100 * luminance(answer.reflectance)).toFixed(1)} %`)),
       fact('Radiosity', `${readable(luminance(answer.radiosity))} lm/m²`),
       fact('Luminance', `${readable(luminance(answer.radiosity) / Math.PI)} cd/m²`),
-      fact('Direct', `${(100 * answer.direct).toFixed(1)} %`),
       fact('Place', point.toArray().map((x) => x.toFixed(2)).join(', ') + ' m'),
     );
-    sources.replaceChildren(...answer.sources.map(({ name, share }) =>
-      el('div', { class: 'bar' }, el('span', {}, name), el('b', {}, `${(100 * share).toFixed(1)} %`), el('i', { style: `width:${Math.min(100, 100 * share)}%` }))));
+    lights.replaceChildren(...answer.lights.map(bar));
+    surfaces.replaceChildren(...answer.surfaces.map(bar));
   });
   return section('meter', 'Light meter', true, none, body);
+}
+
+function bar({ name, share }: Share): HTMLElement {
+  return el('div', { class: 'bar' }, el('span', {}, name), el('b', {}, `${(100 * share).toFixed(1)} %`), el('i', { style: `width:${Math.min(100, 100 * share)}%` }));
 }
 
 export function gridPanel(app: App): HTMLElement {

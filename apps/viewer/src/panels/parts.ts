@@ -42,7 +42,7 @@ export function slider(
   const range = el('input', { type: 'range', min, max, step, 'aria-label': label, input: () => give(range, false), change: () => give(range, true) });
   const number = el('input', { type: 'number', step, 'aria-label': `${label}${unit ? `, ${unit}` : ''}`, change: () => give(number, true) });
   const set = (value: number) => {
-    const text = String(Number(value.toFixed(3)));
+    const text = String(Number(value.toFixed(2)));
     if (document.activeElement !== number) number.value = text;
     range.value = text;
     const share = (100 * (Math.min(max, Math.max(min, value)) - min)) / (max - min);

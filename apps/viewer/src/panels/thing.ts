@@ -1,5 +1,5 @@
 // What is selected: its paint, its place, copies of it.
-import { Matrix4, Vector3 } from 'three';
+import { Vector3 } from 'three';
 import type { App } from '../app';
 import { turnOf } from '../gizmo';
 import { button, choice, el, hex, linear, section } from './parts';
@@ -33,28 +33,17 @@ export function thingPanel(app: App): HTMLElement {
   const mode = choice('Handles', [['translate', 'Move', 'M'], ['rotate', 'Turn', 'M']], (value) => app.gizmo.setMode(value));
   const copy = button('Duplicate', () => app.duplicate(), { key: 'Ctrl+D' });
   const remove = button('Delete', () => app.delete(), { key: 'Delete', kind: 'danger' });
-  const spot = (matrix: Matrix4): Vector3 => {
-    const surface = app.stage.surfaces.get(app.selected!);
-    return surface ? app.stage.toScene(app.middle(surface)) : new Vector3().setFromMatrixPosition(matrix);
-  };
+  const spot = (): Vector3 => app.stage.toScene(app.middle());
   const put = (axis: number | null) => {
     const object = app.selected === null ? undefined : app.objects.get(app.selected);
     if (!object || !app.scene) return;
-    const matrix = new Matrix4().fromArray(object.matrix);
-    const at = spot(matrix);
     if (axis !== null) {
-      const value = places[axis].valueAsNumber;
-      if (!Number.isFinite(value)) return;
-      const way = new Vector3().setComponent(axis, value - at.getComponent(axis));
-      app.move(object.id, new Matrix4().makeTranslation(way).multiply(matrix));
+      const way = new Vector3().setComponent(axis, places[axis].valueAsNumber - spot().getComponent(axis));
+      if (Number.isFinite(way.lengthSq())) app.nudge(way.applyQuaternion(app.stage.root.quaternion), 0);
     } else {
-      const up = new Vector3(...app.scene.up);
-      const angle = ((turn.valueAsNumber - turnOf(object.matrix, up)) * Math.PI) / 180;
-      if (!Number.isFinite(angle)) return;
-      const about = new Matrix4().makeTranslation(at).multiply(new Matrix4().makeRotationAxis(up, angle)).multiply(new Matrix4().makeTranslation(at.clone().negate()));
-      app.move(object.id, about.multiply(matrix));
+      const angle = ((turn.valueAsNumber - turnOf(object.matrix, new Vector3(...app.scene.up))) * Math.PI) / 180;
+      if (Number.isFinite(angle)) app.nudge(new Vector3(), angle);
     }
-    app.gizmo.place();
   };
   const moving = el('div', {},
     el('div', { class: 'row' }, mode),
@@ -76,9 +65,9 @@ export function thingPanel(app: App): HTMLElement {
     const editing = document.activeElement;
     if (editing !== paint) paint.value = hex(object.reflectance);
     if (editing !== reflectance) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
-    moving.hidden = !object.movable;
-    fixed.hidden = object.movable;
-    const at = spot(new Matrix4().fromArray(object.matrix));
+    moving.hidden = !app.isMovable;
+    fixed.hidden = app.isMovable;
+    const at = spot();
     places.forEach((input, k) => {
       if (editing !== input) input.value = at.getComponent(k).toFixed(3);
     });

@@ -179,8 +179,14 @@ pub fn lit_glb(
     }
     match document {
         Some(document) => rewrite::rewrite(scene, document, primitives, style),
-        None => plain::build(scene, primitives, style),
+        None => plain::lit(scene, primitives, style),
     }
+}
+
+/// The bytes of a GLB of a scene that is yet to be lit, such as one that was made or edited in code: surfaces, materials,
+/// lamps and cameras. glTF has no skies, so there is none.
+pub fn scene_glb(scene: &Scene) -> Result<Vec<u8>, WriteError> {
+    plain::dark(scene)
 }
 
 fn check(scene: &Scene, primitive: &LitPrimitive, style: &Style) -> Result<(), String> {

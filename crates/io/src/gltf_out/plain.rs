@@ -3,9 +3,9 @@
 use super::glb::{Builder, Target};
 use super::materials::{Materials, unit};
 use super::mixture::{Mixture, mixture};
-use super::{Light, LitPrimitive, LitVertex, Style, WriteError, vertices};
+use super::{Light, LitPrimitive, LitVertex, Style, WriteError, lamps, vertices};
 use glam::{DVec2, Vec3};
-use radiosity_scene::{AlphaMode, Camera, Material, Object, Projection, Scene, Texture, TextureRef, Up, Wrap};
+use radiosity_scene::{AlphaMode, Camera, Material, Object, PointLight, Projection, Scene, Texture, TextureRef, Up, Wrap};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
@@ -13,7 +13,22 @@ use std::io::Cursor;
 /// What `asset.generator` says.
 pub(super) const GENERATOR: &str = concat!("radiosity ", env!("CARGO_PKG_VERSION"));
 
-pub(super) fn build(scene: &Scene, primitives: &[LitPrimitive], style: &Style) -> Result<Vec<u8>, WriteError> {
+/// The scene with light on its surfaces, and so without lamps: they would light it a second time.
+pub(super) fn lit(scene: &Scene, primitives: &[LitPrimitive], style: &Style) -> Result<Vec<u8>, WriteError> {
+    build(scene, primitives, style, &[])
+}
+
+/// The scene to be lit, with its lamps.
+pub(super) fn dark(scene: &Scene) -> Result<Vec<u8>, WriteError> {
+    build(scene, &[], &Style::Vertices, &scene.lights)
+}
+
+fn build(
+    scene: &Scene,
+    primitives: &[LitPrimitive],
+    style: &Style,
+    lamps: &[PointLight],
+) -> Result<Vec<u8>, WriteError> {
     let mut builder = Builder::default();
     builder.json.insert("asset".into(), json!({ "version": "2.0", "generator": GENERATOR }));
     let mut pictures =
@@ -56,6 +71,7 @@ pub(super) fn build(scene: &Scene, primitives: &[LitPrimitive], style: &Style) -
         let matrix = camera.world_from_camera.to_cols_array().map(|x| x as f32);
         children.push(builder.push("nodes", json!({ "name": camera.name, "camera": index, "matrix": matrix })));
     }
+    children.extend(lamps::put_in(&mut builder, lamps));
     if let Some(root) = builder.list("nodes").get_mut(root) {
         if !children.is_empty() {
             root["children"] = json!(children);

@@ -419,7 +419,7 @@ fn many_objects_are_written_in_time_that_goes_with_their_number() {
     }
     let lit: Vec<LitPrimitive> = (0..scene.objects.len()).map(lit).collect();
     let start = std::time::Instant::now();
-    assert!(!plain::build(&scene, &lit, &Style::Vertices).unwrap().is_empty());
+    assert!(!plain::lit(&scene, &lit, &Style::Vertices).unwrap().is_empty());
     assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
 }
 
@@ -510,4 +510,39 @@ fn unlit_sun_is_brighter_than_shade_and_keeps_its_hue() {
     assert!((shade[0] - 0.36).abs() < 1e-6, "{shade:?}");
     assert!(sun[0] > 2.0 * shade[0] && sun[0] < 1.0, "{sun:?}");
     assert!((0.45..0.65).contains(&(sun[1] / sun[0])), "{sun:?}");
+}
+
+/// A scene that was edited in code is read again as it was, lamps included.
+#[test]
+fn a_dark_scene_keeps_its_lamps_and_cameras() {
+    let lamp = |name: &str, kind, range| radiosity_scene::PointLight {
+        name: name.to_owned(),
+        kind,
+        position: DVec3::new(1.0, 2.0, -3.0),
+        direction: DVec3::new(0.6, -0.8, 0.0),
+        intensity: [300.0, 200.0, 100.0],
+        range,
+    };
+    use radiosity_scene::PointLightKind as Kind;
+    let mut scene = Scene::default();
+    scene.materials = vec![Material { emissive: [1000.0, 500.0, 0.0], ..Material::default() }];
+    scene.add_quad("floor", 0, [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y]);
+    scene.lights = vec![
+        lamp("bulb", Kind::Point, Some(4.0)),
+        lamp("spot", Kind::Spot { inner: 0.3, outer: 0.5 }, None),
+        lamp("sun", Kind::Directional, None),
+    ];
+    let eye = DVec3::new(3.0, 1.0, 2.0);
+    scene.cameras = vec![radiosity_scene::Camera::look_at("eye", eye, DVec3::ZERO, DVec3::Y, 0.8)];
+    let bytes = scene_glb(&scene).unwrap();
+    let back = gltf::load("t.glb", &bytes, &Memory::default(), &LoadOptions::default()).unwrap().scene;
+    assert_eq!(back.lights.len(), 3);
+    for (a, b) in scene.lights.iter().zip(&back.lights) {
+        assert_eq!((&a.name, a.range, a.intensity), (&b.name, b.range, b.intensity));
+        assert!(a.kind == Kind::Directional || a.position.distance(b.position) < 1e-6, "{b:?}");
+        assert!(a.kind == Kind::Point || a.direction.distance(b.direction) < 1e-6, "{b:?}");
+    }
+    assert_eq!(back.materials[0].emissive, scene.materials[0].emissive);
+    let place = back.cameras[0].world_from_camera.w_axis.truncate();
+    assert!(place.distance(eye) < 1e-5, "{place}");
 }

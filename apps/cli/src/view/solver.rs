@@ -1,0 +1,396 @@
+//! The thread that owns the session: takes what pages ask, works a little, and posts what has changed.
+
+use super::board::{Board, Notice, Subject};
+use super::history::{self, Gesture, History, targets};
+use super::wire::{self, CameraPlace, ProbeAnswer, Request, Say, Share};
+use radiosity::session::{Edit, EditError, Layer, LightKind, Model, ObjectId, Probe, Session};
+use radiosity::{Bands, Scene, luminance};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::{mpsc, oneshot};
+
+/// Work between looks at what pages ask: an edit waits no longer.
+const SLICE: Duration = Duration::from_millis(10);
+
+/// Light is posted this often at most; screens show no more.
+const EVERY: Duration = Duration::from_millis(33);
+
+/// Cameras that are kept at most, and letters of their names.
+const MOST_CAMERAS: usize = 100;
+const LONGEST_NAME: usize = 80;
+
+/// Sources of light that are named at a place, and the least of their shares.
+const MOST_SOURCES: usize = 6;
+const LEAST_SHARE: f32 = 1e-3;
+
+/// What pages ask of the solver.
+pub enum Command {
+    /// A message of a page, and where the answer goes.
+    Ask { page: u64, request: Request, answer: mpsc::Sender<String> },
+    /// A page looks at another layer.
+    Watch,
+    /// Somebody wants all there is, to write it into a file.
+    Export(oneshot::Sender<Export>),
+    /// The end.
+    Stop,
+}
+
+/// The scene as it is now with its light.
+pub struct Export {
+    /// The scene as edited, with the cameras that were kept.
+    pub scene: Scene,
+    /// What is drawn.
+    pub model: Model,
+    /// Irradiance at the vertices of each object of the model.
+    pub light: Vec<Vec<Bands>>,
+}
+
+/// The state of the thread.
+struct Solver {
+    session: Session,
+    model: Model,
+    board: Arc<Board>,
+    history: History,
+    cameras: Vec<CameraPlace>,
+    /// Objects whose light is not yet posted.
+    changed: BTreeSet<ObjectId>,
+    /// Layers of which everything was posted once.
+    posted: Vec<Layer>,
+    last_post: Option<Instant>,
+    is_done: bool,
+    edits: u64,
+    /// When the last edit was made, until its light is posted.
+    edited: Option<Instant>,
+    latency: Option<f64>,
+    /// Since when rays have been traced without a change, and how many there were.
+    since: (Instant, u32),
+}
+
+/// Works until it is told to stop.
+pub fn run(session: Session, placed: CameraPlace, board: Arc<Board>, mut commands: mpsc::Receiver<Command>) {
+    let model = session.model();
+    let mut solver = Solver {
+        session,
+        model,
+        board,
+        history: History::default(),
+        cameras: Vec::new(),
+        changed: BTreeSet::new(),
+        posted: Vec::new(),
+        last_post: None,
+        is_done: false,
+        edits: 0,
+        edited: None,
+        latency: None,
+        since: (Instant::now(), 0),
+    };
+    solver.post_scene(placed);
+    solver.post_status();
+    loop {
+        let mut waiting: Vec<Command> = Vec::new();
+        if solver.is_done {
+            match commands.blocking_recv() {
+                Some(command) => waiting.push(command),
+                None => return,
+            }
+        }
+        while let Ok(command) = commands.try_recv() {
+            waiting.push(command);
+        }
+        for at in 0..waiting.len() {
+            if !is_outdated(&waiting[at..]) && !solver.obey(&mut waiting[at]) {
+                return;
+            }
+        }
+        solver.work();
+    }
+}
+
+/// Whether the first command is an edit that the next one makes anew.
+fn is_outdated(commands: &[Command]) -> bool {
+    let gesture = |command: &Command| match command {
+        Command::Ask { page, request: Request::Edit { edit, gesture: Some(gesture) }, .. } => {
+            Some((*page, *gesture, targets(edit)))
+        }
+        _ => None,
+    };
+    match commands {
+        [first, next, ..] => gesture(first).is_some_and(|first| gesture(next) == Some(first)),
+        _ => false,
+    }
+}
+
+impl Solver {
+    /// Does what is asked; whether to go on.
+    fn obey(&mut self, command: &mut Command) -> bool {
+        match command {
+            Command::Ask { page, request, answer } => {
+                if let Some(text) = self.answer(*page, request) {
+                    // A page that does not read its answers misses them.
+                    let _ = answer.try_send(text);
+                }
+            }
+            Command::Watch => {}
+            Command::Export(wanted) => {
+                let (sender, _) = oneshot::channel();
+                // Whoever has gone away needs nothing.
+                let _ = std::mem::replace(wanted, sender).send(self.export());
+            }
+            Command::Stop => return false,
+        }
+        true
+    }
+
+    fn answer(&mut self, page: u64, request: &Request) -> Option<String> {
+        match request {
+            Request::Edit { edit, gesture } => match self.apply(edit) {
+                Ok(inverse) => {
+                    let gesture: Option<Gesture> = gesture.map(|gesture| (page, gesture));
+                    self.history.did(history::label(edit, &self.model), inverse, gesture);
+                    self.post_history();
+                    None
+                }
+                Err(error) => Some(refusal(format!("Not changed: {error}."))),
+            },
+            Request::Undo | Request::Redo => {
+                let is_undo = *request == Request::Undo;
+                let next = if is_undo { self.history.next_undo() } else { self.history.next_redo() };
+                let edit = next?.clone();
+                match self.apply(&edit) {
+                    Ok(inverse) if is_undo => self.history.undid(inverse),
+                    Ok(inverse) => self.history.redid(inverse),
+                    Err(error) => return Some(refusal(format!("Not changed: {error}."))),
+                }
+                self.post_history();
+                None
+            }
+            // The board keeps who looks at what.
+            Request::Layer { .. } => None,
+            Request::Probe { question, object, triangle, uv } => {
+                let is_place = uv.iter().all(|x| x.is_finite());
+                let probe = self.session.probe(*object, *triangle, *uv).filter(|_| is_place);
+                Some(Say::Probe { question: *question, answer: probe.map(|probe| self.read(&probe)) }.text())
+            }
+            Request::Rays { question, object, triangle } => {
+                Some(Say::Rays { question: *question, rays: self.session.rays(*object, *triangle) }.text())
+            }
+            Request::Bookmark { camera } => self.keep(camera),
+            Request::Forget { name } => {
+                self.cameras.retain(|camera| camera.name != *name);
+                self.post_cameras();
+                None
+            }
+        }
+    }
+
+    fn apply(&mut self, edit: &Edit) -> Result<Edit, EditError> {
+        let applied = self.session.apply(edit)?;
+        (self.edited, self.is_done) = (Some(Instant::now()), false);
+        self.edits += 1;
+        self.since = (Instant::now(), self.session.status().rays);
+        self.post_model();
+        Ok(applied.inverse)
+    }
+
+    /// Keeps a camera; what is said against it.
+    fn keep(&mut self, camera: &CameraPlace) -> Option<String> {
+        let is_sound = camera.matrix.iter().all(|x| x.is_finite() && x.abs() < 1e9)
+            && (0.01..3.1).contains(&camera.fov)
+            && (1..=LONGEST_NAME).contains(&camera.name.chars().count());
+        if !is_sound {
+            return Some(refusal("Not kept: the camera or its name is none.".to_owned()));
+        }
+        match self.cameras.iter().position(|kept| kept.name == camera.name) {
+            Some(kept) => self.cameras[kept] = camera.clone(),
+            None if self.cameras.len() == MOST_CAMERAS => {
+                return Some(refusal(format!("Not kept: there are {MOST_CAMERAS} cameras; forget one first.")));
+            }
+            None => self.cameras.push(camera.clone()),
+        }
+        self.post_cameras();
+        None
+    }
+
+    /// A piece of work, and what is new of it on the board.
+    fn work(&mut self) {
+        let mut is_complete = false;
+        if !self.is_done {
+            let step = self.session.step(SLICE);
+            self.changed.extend(step.changed);
+            (self.is_done, is_complete) = (step.is_done, step.is_complete || step.is_done);
+        }
+        let layers = self.board.layers();
+        let is_new = |layer: &Layer| !self.posted.contains(layer);
+        let due = self.last_post.is_none_or(|last| last.elapsed() >= EVERY);
+        if !(due || self.is_done || layers.iter().any(is_new) || (is_complete && self.edited.is_some())) {
+            return;
+        }
+        for layer in &layers {
+            let is_new = !self.posted.contains(layer);
+            for object in &self.model.objects {
+                if (is_new || self.changed.contains(&object.id)) && !object.deleted {
+                    let light = wire::halves(&self.session.light(object.id, *layer));
+                    self.board.post_light(*layer, object.id.0, &light);
+                }
+            }
+        }
+        self.posted = layers;
+        self.changed.clear();
+        self.last_post = Some(Instant::now());
+        if let Some(edited) = self.edited.filter(|_| is_complete) {
+            self.latency = Some(1e3 * edited.elapsed().as_secs_f64());
+            self.edited = None;
+        }
+        self.post_status();
+    }
+
+    fn say(&self, subject: Subject, text: String) {
+        self.board.post(subject, Notice::Text(text));
+    }
+
+    fn post_scene(&mut self, placed: CameraPlace) {
+        let [low, high] = self.model.bounds;
+        let own = self.model.cameras.iter().filter_map(|camera| {
+            Some(CameraPlace { name: camera.name.clone(), matrix: camera.matrix, fov: camera.vertical_fov? })
+        });
+        let mut cameras: Vec<CameraPlace> = own.collect();
+        cameras.push(placed);
+        let text = Say::Scene {
+            name: &self.model.name,
+            version: env!("CARGO_PKG_VERSION"),
+            up: self.model.up,
+            low,
+            high,
+            cameras,
+            sky: wire::sky(self.session.scene()),
+        }
+        .text();
+        self.say(Subject::Scene, text);
+        self.post_model();
+        self.post_cameras();
+        self.post_history();
+    }
+
+    /// Objects and lights; the board knows which of them are news.
+    fn post_model(&mut self) {
+        let before: BTreeSet<ObjectId> = match self.last_post {
+            None => BTreeSet::new(),
+            Some(_) => self.model.objects.iter().map(|object| object.id).collect(),
+        };
+        self.model = self.session.model();
+        for object in &self.model.objects {
+            if !before.contains(&object.id) {
+                self.board.post(Subject::Mesh(object.id.0), Notice::Binary(wire::mesh(object)));
+                self.changed.insert(object.id);
+            }
+            self.say(Subject::Object(object.id.0), wire::object(object, self.session.scene()));
+        }
+        for light in &self.model.lights {
+            self.say(Subject::Light(light.id.0), wire::light(light));
+        }
+    }
+
+    fn post_cameras(&self) {
+        self.say(Subject::Bookmarks, Say::Bookmarks { cameras: &self.cameras }.text());
+    }
+
+    fn post_history(&self) {
+        let [undo, redo] = self.history.labels();
+        self.say(Subject::History, Say::History { undo, redo }.text());
+    }
+
+    fn post_status(&self) {
+        let status = self.session.status();
+        let (start, first) = self.since;
+        let traced = status.rays.saturating_sub(first);
+        let left = match traced {
+            0 => None,
+            _ => Some(start.elapsed().as_secs_f64() * f64::from(status.most_rays - status.rays) / f64::from(traced)),
+        };
+        let doing = match (self.is_done, self.edited.is_some()) {
+            (true, _) => match self.latency {
+                Some(latency) => format!("Up to date; the last change took {latency:.0} ms to be seen"),
+                None => "Up to date".to_owned(),
+            },
+            (false, true) => "Following the change".to_owned(),
+            (false, false) if status.rays == 0 => "First light".to_owned(),
+            (false, false) => format!("Tracing rays: {} of {} an element", status.rays, status.most_rays),
+        };
+        let status = wire::Status {
+            doing,
+            rays: status.rays,
+            most_rays: status.most_rays,
+            error: Some(status.error).filter(|error| error.is_finite()),
+            seconds: status.seconds,
+            left: left.filter(|_| !self.is_done),
+            rays_traced: status.rays_traced,
+            elements: status.elements,
+            latency: self.latency,
+            is_done: self.is_done,
+            edits: self.edits,
+        };
+        self.say(Subject::Status, Say::Status(status).text());
+    }
+
+    /// A probe as people read it.
+    fn read(&self, probe: &Probe) -> ProbeAnswer {
+        let share = |bands: Bands| if probe.lux > 0.0 { luminance(bands) / probe.lux } else { 0.0 };
+        let light = |id: radiosity::session::LightId| {
+            let found = self.model.lights.iter().find(|light| light.id == id);
+            found.map_or_else(String::new, |light| match (light.name.as_str(), light.kind) {
+                ("", LightKind::Sky) => "sky".to_owned(),
+                ("", _) => format!("light {}", id.0 + 1),
+                (name, _) => name.to_owned(),
+            })
+        };
+        let object = |id: ObjectId| {
+            let found = self.model.objects.iter().find(|object| object.id == id);
+            found.map_or_else(String::new, |object| object.name.clone())
+        };
+        let lights = probe.lights.iter().map(|(id, bands)| (light(*id), share(*bands)));
+        let straight = ("straight from lights".to_owned(), share(probe.direct));
+        let surfaces = probe.objects.iter().map(|(id, bands)| (object(*id), share(*bands)));
+        ProbeAnswer {
+            illuminance: probe.lux,
+            irradiance: probe.irradiance,
+            reflectance: probe.reflectance,
+            radiosity: probe.radiosity,
+            lights: shares(lights),
+            surfaces: shares(std::iter::once(straight).chain(surfaces)),
+        }
+    }
+
+    fn export(&self) -> Export {
+        let mut scene = self.session.edited_scene();
+        for camera in &self.cameras {
+            scene.cameras.push(radiosity::Camera {
+                name: camera.name.clone(),
+                world_from_camera: glam::DMat4::from_cols_array(&camera.matrix),
+                projection: radiosity::Projection::Perspective { vertical_fov: camera.fov },
+                aspect: None,
+            });
+        }
+        let light = self.model.objects.iter().map(|object| self.session.light(object.id, Layer::Total)).collect();
+        Export { scene, model: self.model.clone(), light }
+    }
+}
+
+/// The largest shares; primitives of one name are one thing to people.
+fn shares(named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
+    let mut shares: Vec<Share> = Vec::new();
+    for (name, share) in named {
+        match shares.iter_mut().find(|known| known.name == name) {
+            Some(known) => known.share += share,
+            None => shares.push(Share { name, share }),
+        }
+    }
+    shares.retain(|known| known.share >= LEAST_SHARE);
+    shares.sort_by(|a, b| b.share.total_cmp(&a.share));
+    shares.truncate(MOST_SOURCES);
+    shares
+}
+
+fn refusal(message: String) -> String {
+    Say::Refused { message }.text()
+}

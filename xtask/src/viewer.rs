@@ -1,0 +1,99 @@
+//! The page of `radiosity view`: built by npm from `apps/viewer/src` into `apps/viewer/dist`, which is committed, so that
+//! the program builds without Node.
+
+use crate::fault::Fault;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The oldest Node that its tools run on.
+const NODE: u32 = 20;
+
+/// Names of the browser whose engine the tests are written for.
+const BROWSERS: &[&str] = &["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// `cargo xtask viewer`.
+pub fn command(arguments: &[&str]) -> Result<String, Fault> {
+    let root = crate::root();
+    let viewer = root.join("apps/viewer");
+    let committed = viewer.join("dist/index.html");
+    match arguments {
+        [] => {
+            install(&viewer)?;
+            build(&viewer, "dist")?;
+            Ok(format!("viewer: wrote {}", committed.display()))
+        }
+        ["--check"] => {
+            install(&viewer)?;
+            build(&viewer, "node_modules/.check")?;
+            let read = |path: &Path| std::fs::read(path).map_err(Fault::at(path));
+            let built = read(&viewer.join("node_modules/.check/index.html"))?;
+            match built == read(&committed)? {
+                true => Ok("viewer: what is committed is current".to_owned()),
+                false => Err(Fault::Viewer(format!(
+                    "{} is not what its sources make; run `cargo xtask viewer` and commit it",
+                    committed.display()
+                ))),
+            }
+        }
+        ["--test", names @ ..] => {
+            install(&viewer)?;
+            let browser = browser()?;
+            let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+            let mut build = Command::new(cargo);
+            run(build.current_dir(&root).args(["build", "--locked", "--package", "radiosity-cli"]))?;
+            let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+            let mut tests = Command::new("node");
+            tests.current_dir(&viewer).args(["--test", "--test-concurrency=1"]);
+            for name in names {
+                tests.args(["--test-name-pattern", name]);
+            }
+            tests.arg("test/").env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
+            run(&mut tests)?;
+            Ok("viewer: all tests passed".to_owned())
+        }
+        _ => Err(Fault::Usage("'viewer' takes nothing, '--check', or '--test [NAME]...'".to_owned())),
+    }
+}
+
+/// What the page is made of, as the lock file says.
+fn install(viewer: &Path) -> Result<(), Fault> {
+    let version = Command::new("node").arg("--version").output().ok();
+    let version = version.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned()).unwrap_or_default();
+    let major = version.trim_start_matches('v').split('.').next().and_then(|major| major.parse::<u32>().ok());
+    if major.is_none_or(|major| major < NODE) {
+        let there = if version.is_empty() { "there is none".to_owned() } else { format!("there is {version}") };
+        return Err(Fault::Viewer(format!(
+            "Node.js {NODE} or newer is needed, {there}; install it with npm (https://nodejs.org). The program itself is built without"
+        )));
+    }
+    run(Command::new("npm").current_dir(viewer).args(["ci", "--no-audit", "--no-fund", "--loglevel=error"]))
+}
+
+fn build(viewer: &Path, folder: &str) -> Result<(), Fault> {
+    run(Command::new("npx").current_dir(viewer).arg("tsc"))?;
+    run(Command::new("npx").current_dir(viewer).args(["vite", "build", "--logLevel=warn", "--emptyOutDir", "--outDir", folder]))
+}
+
+/// The browser that is asked for by `CHROMIUM`, or one that is installed.
+fn browser() -> Result<PathBuf, Fault> {
+    if let Some(asked) = std::env::var_os("CHROMIUM") {
+        return Ok(asked.into());
+    }
+    let folders: Vec<PathBuf> = std::env::var_os("PATH").map(|path| std::env::split_paths(&path).collect()).unwrap_or_default();
+    let places = BROWSERS.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    places.into_iter().find(|place| place.is_file()).ok_or_else(|| {
+        Fault::Viewer("the tests need Chromium; install it (Debian: apt install chromium), or name it by CHROMIUM".to_owned())
+    })
+}
+
+/// Runs a program whose output goes where ours goes.
+fn run(command: &mut Command) -> Result<(), Fault> {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    let line = words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ");
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(Fault::Viewer(format!("`{line}`: {status}"))),
+        Err(error) => Err(Fault::Viewer(format!("`{line}` did not start: {error}"))),
+    }
+}
