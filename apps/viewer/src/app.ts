@@ -166,7 +166,7 @@ export class App {
     surface.visible = !object.deleted;
     surface.material.uniforms.tint.value.fromArray(object.tint);
     surface.material.uniforms.emission.value.fromArray(object.emission);
-    surface.dress(object.texture ? this.texture(object.texture) : null, object.texture?.transform ?? [1, 0, 0, 1, 0, 0]);
+    surface.dress(object.texture ? this.texture(object.texture) : null);
     // What is dragged here is ahead of what the server has seen.
     if (!this.gizmo.isDragging || !this.group().includes(surface)) {
       surface.matrix.fromArray(object.matrix);

@@ -69,7 +69,7 @@ function start(): void {
     last = now;
     app.navigator.update(passed / 1000);
     app.exposure.update(now, passed);
-    app.stage.draw();
+    app.stage.draw(now);
     numbers.update();
     requestAnimationFrame(tick);
   };

@@ -20,6 +20,17 @@ export interface Hit {
   uv: [number, number];
 }
 
+/** Pixels drawn for one shown, along each side: fewer while something moves and frames take long. */
+const SHARPNESS = [1, 0.7, 0.5, 0.35];
+
+/** Milliseconds for a frame that are too many, and few enough for more pixels; how many frames in a row decide. */
+const SLOW = 34;
+const QUICK = 12;
+const IN_A_ROW = 4;
+
+/** Milliseconds of rest before all is drawn sharp. */
+const REST = 250;
+
 /** The picture that the meter sees. */
 const METER = [64, 40];
 
@@ -48,6 +59,11 @@ export class Stage {
   private sky: Mesh<SphereGeometry, ShaderMaterial>;
   private meter = new WebGLRenderTarget(METER[0], METER[1], { type: FloatType, format: RGBAFormat });
   private isMetering = false;
+  /** Of `SHARPNESS`: in motion, and now. */
+  private coarseness = 0;
+  private drawn = 0;
+  private row = 0;
+  private lastFrame = 0;
 
   constructor() {
     this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, powerPreference: 'high-performance' });
@@ -89,7 +105,10 @@ export class Stage {
     this.sky.frustumCulled = false;
     this.scene.add(this.sky, this.root, this.tools);
     this.root.add(this.overlay);
-    new ResizeObserver(() => this.resize()).observe(this.canvas);
+    new ResizeObserver(() => {
+      this.resize(0);
+      this.drawNow();
+    }).observe(this.canvas);
   }
 
   /** The axes, the bounds and the sky of a scene. */
@@ -146,8 +165,9 @@ export class Stage {
     this.change();
   }
 
-  /** Draws if there is something new; a tree of boxes is built on the way where one is missing. */
-  draw(): void {
+  /** Draws if there is something new; else a tree of boxes is built where one is missing. */
+  draw(now: number): void {
+    if (!this.dirty && this.drawn > 0 && now - this.lastFrame > REST) this.resize(0);
     if (!this.dirty) {
       for (const surface of this.surfaces.values()) {
         if (!surface.isReady) return void surface.tree;
@@ -155,24 +175,40 @@ export class Stage {
       return;
     }
     this.dirty = false;
+    this.pace(now - this.lastFrame);
+    this.lastFrame = now;
     this.renderer.render(this.scene, this.camera);
     this.frames += 1;
   }
 
-  /** Draws now, whatever has changed, for who counts frames or reads pixels. */
-  drawNow(): void {
-    this.dirty = true;
-    this.draw();
+  /** Keeps motion smooth on slow machines: fewer pixels while frames take long. */
+  private pace(passed: number): void {
+    // After a rest the time since the last frame says nothing.
+    if (passed > REST) return;
+    const way = passed > SLOW ? 1 : passed < QUICK ? -1 : 0;
+    this.row = way === Math.sign(this.row) ? this.row + way : way;
+    if (Math.abs(this.row) >= IN_A_ROW) {
+      this.coarseness = Math.max(0, Math.min(SHARPNESS.length - 1, this.coarseness + way));
+      this.row = 0;
+    }
+    if (this.coarseness !== this.drawn) this.resize(this.coarseness);
   }
 
-  private resize(): void {
+  /** Draws now, whatever has changed, for who counts frames or reads pixels. */
+  drawNow(): void {
+    this.renderer.render(this.scene, this.camera);
+    this.frames += 1;
+  }
+
+  private resize(coarseness: number): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.drawn = coarseness;
+    this.renderer.setPixelRatio(SHARPNESS[coarseness] * Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.drawNow();
+    this.dirty = true;
   }
 
   /** The first surface along a ray. `side` says which faces count. */

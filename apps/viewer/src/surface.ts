@@ -1,7 +1,7 @@
 // A surface as the eye sees it, or as a meter does: light at vertices times reflectance at pixels.
 import {
   BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, GLSL3, Mesh, ShaderMaterial, Texture, Vector3,
-  Matrix3, type IUniform,
+  type IUniform,
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
 import { LEVELS, PALETTE } from './scale';
@@ -51,11 +51,10 @@ const VERTEX = /* glsl */ `
   in vec3 light;
   out vec3 vLight;
   out vec2 vUv;
-  uniform mat3 uvTransform;
   void main() {
     vLight = light * ${UNIT.toFixed(1)};
     #ifdef TEXTURED
-      vUv = (uvTransform * vec3(uv, 1.0)).xy;
+      vUv = uv;
     #endif
     gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
   }
@@ -150,7 +149,6 @@ export class Surface extends Mesh<BufferGeometry, ShaderMaterial> {
         tint: { value: new Vector3(1, 1, 1) },
         emission: { value: new Vector3() },
         map: { value: null },
-        uvTransform: { value: new Matrix3() },
       },
     });
     super(geometry, material);
@@ -166,11 +164,9 @@ export class Surface extends Mesh<BufferGeometry, ShaderMaterial> {
   }
 
   /** A picture, or none. */
-  dress(texture: Texture | null, transform: number[]): void {
+  dress(texture: Texture | null): void {
     const had = 'TEXTURED' in this.material.defines;
     this.material.uniforms.map.value = texture;
-    const [a, b, c, d, x, y] = transform;
-    this.material.uniforms.uvTransform.value.set(a, c, x, b, d, y, 0, 0, 1);
     if (texture) this.material.defines.TEXTURED = '';
     else delete this.material.defines.TEXTURED;
     if (had !== (texture !== null)) this.material.needsUpdate = true;

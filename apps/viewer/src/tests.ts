@@ -69,8 +69,7 @@ export function tests(app: App) {
       let frames = 0;
       const tick = () => {
         app.stage.camera.rotateY(0.01);
-        app.stage.drawNow();
-        app.stage.renderer.getContext().finish();
+        app.stage.change();
         frames += 1;
         const passed = (performance.now() - begin) / 1000;
         if (passed < seconds) requestAnimationFrame(tick);

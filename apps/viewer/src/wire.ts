@@ -24,8 +24,6 @@ export interface CameraPlace {
 /** A picture on an object. */
 export interface TextureUse {
   index: number;
-  /** Columns of the affine map of texture coordinates. */
-  transform: number[];
   wrap: ['repeat' | 'mirror' | 'clamp', 'repeat' | 'mirror' | 'clamp'];
   nearest: boolean;
 }
@@ -41,7 +39,7 @@ export interface ObjectNotice {
   matrix: number[];
   /** Mean reflectance, for people. */
   reflectance: [number, number, number];
-  /** What the picture, if any, is multiplied with. */
+  /** Reflectance; with a picture, what that is multiplied with. */
   tint: [number, number, number];
   texture: TextureUse | null;
   /** cd/m². */

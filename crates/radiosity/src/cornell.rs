@@ -41,10 +41,7 @@ pub fn cornell_box() -> Scene {
         ("tall block", 0, [[265.0, 0.0, 296.0], [265.0, 330.0, 296.0], [423.0, 330.0, 247.0], [423.0, 0.0, 247.0]]),
     ];
     for (name, material, corners) in QUADS {
-        let object = scene.add_quad(name, *material, corners.map(|p| DVec3::from(p) / 1000.0));
-        // Sides of one block are one thing.
-        let first = scene.objects.iter().position(|other| other.name == *name).unwrap_or(object);
-        scene.objects[object].source.node = first;
+        scene.add_quad(name, *material, corners.map(|p| DVec3::from(p) / 1000.0));
     }
     // The published camera: a 35 mm lens before a 25 mm square film, 0.8 m in front of the opening.
     let mut camera = Camera::look_at(

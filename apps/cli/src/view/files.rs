@@ -3,7 +3,7 @@
 use super::solver::Export;
 use glam::{DMat4, DVec3, Vec2};
 use radiosity::io::gltf_out::{Light, LitPrimitive, LitVertex, Style, WriteError, lit_glb, scene_glb};
-use radiosity::{Object, Scene};
+use radiosity::{Material, Object, Scene};
 
 /// The scene as it was edited, to be opened again: with its lamps, and with the cameras that were kept.
 pub fn edited(export: Export) -> Result<Vec<u8>, WriteError> {
@@ -16,7 +16,7 @@ pub fn lit(export: Export) -> Result<Vec<u8>, WriteError> {
     let mut scene = Scene {
         name: edited.name,
         up: edited.up,
-        materials: edited.materials,
+        materials: edited.materials.into_iter().map(plain_texture).collect(),
         textures: edited.textures,
         cameras: edited.cameras,
         ..Scene::default()
@@ -55,4 +55,21 @@ pub fn lit(export: Export) -> Result<Vec<u8>, WriteError> {
         });
     }
     lit_glb(&scene, None, &primitives, &Style::Vertices)
+}
+
+/// What is drawn has the texture coordinates of the base colour alone, as its picture takes them. Others that do not
+/// share them are left out.
+fn plain_texture(mut material: Material) -> Material {
+    let Some(base) = &mut material.base_color_texture else {
+        return Material { metallic_texture: None, emissive_texture: None, ..material };
+    };
+    let own = (base.uv_set, base.transform);
+    (base.uv_set, base.transform) = (0, glam::DAffine2::IDENTITY);
+    for other in [&mut material.metallic_texture, &mut material.emissive_texture] {
+        *other = other.filter(|other| (other.uv_set, other.transform) == own);
+        if let Some(other) = other {
+            (other.uv_set, other.transform) = (0, glam::DAffine2::IDENTITY);
+        }
+    }
+    material
 }

@@ -179,7 +179,6 @@ pub struct SkyPicture {
 #[derive(Clone, Debug, Serialize)]
 pub struct TextureUse {
     index: usize,
-    transform: [f64; 6],
     wrap: [&'static str; 2],
     nearest: bool,
 }
@@ -193,7 +192,6 @@ impl TextureUse {
         };
         TextureUse {
             index: texture.texture,
-            transform: texture.transform.to_cols_array(),
             wrap: texture.wrap.map(name),
             nearest: texture.nearest,
         }
@@ -204,13 +202,16 @@ impl TextureUse {
 pub fn object(object: &ModelObject, scene: &Scene) -> String {
     let of_scene = object.triangle_of.first().map(|&t| scene.material(t as usize));
     let texture = of_scene.and_then(|material| material.base_color_texture.as_ref()).filter(|_| object.texture.is_some());
+    // Metal's share of the base colour is no diffuse reflectance.
+    let diffuse = of_scene.map_or(1.0, |material| 1.0 - material.metallic);
+    let tint = if texture.is_some() { object.tint.map(|t| t * diffuse) } else { object.reflectance };
     Say::Object {
         id: object.id,
         name: &object.name,
         group: object.group,
         matrix: object.matrix,
         reflectance: object.reflectance,
-        tint: object.tint,
+        tint,
         texture: texture.map(TextureUse::new),
         emission: object.emission.map(|exitance| exitance / PI),
         deleted: object.deleted,

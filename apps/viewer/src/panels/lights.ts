@@ -51,9 +51,9 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     change: () => app.setLight(light(), { colour: filter(colour.value) }, during(true)),
   });
   const find = el('button', {
-    type: 'button', class: 'name', title: 'Select it in the scene',
+    type: 'button', class: 'name', title: `${KINDS[light().type] ?? 'Light'}; select it in the scene`,
     click: () => (light().object !== null ? app.select(light().object) : app.selectLight(id)),
-  }, el('b', {}, name), el('span', { class: 'quiet' }, KINDS[light().type] ?? ''));
+  }, el('b', {}, name));
   const element = el('div', { class: 'light' },
     el('div', { class: 'row' }, el('label', { class: 'toggle bare' }, on, el('i')), find, colour), dimming);
   return {
