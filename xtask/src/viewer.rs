@@ -48,7 +48,7 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
             for name in names {
                 tests.args(["--test-name-pattern", name]);
             }
-            tests.arg("test/").env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
+            tests.arg("test/page.test.mjs").env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
             run(&mut tests)?;
             Ok("viewer: all tests passed".to_owned())
         }

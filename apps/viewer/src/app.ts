@@ -54,6 +54,7 @@ export class App {
   grid: Grid | null = null;
   message = '';
   private listeners = new Map<Topic, (() => void)[]>();
+  private loosened = new Set<number>();
   private textures = new Map<string, Texture>();
   private question = 0;
   private gesture = 0;
@@ -266,10 +267,21 @@ export class App {
     return members.flatMap((object) => this.stage.surfaces.get(object.id) ?? []);
   }
 
-  /** Whether what is selected can be moved. */
+  /** Whether what is selected has handles: furniture has, walls only where that is asked for. */
   get isMovable(): boolean {
     const group = this.group();
-    return group.length > 0 && group.every((surface) => this.objects.get(surface.object)!.movable);
+    return group.length > 0 && group.every((surface) => {
+      const object = this.objects.get(surface.object)!;
+      return object.movable || this.loosened.has(object.group);
+    });
+  }
+
+  /** Lets what is selected be moved, though it is large. */
+  loosen(): void {
+    const object = this.selected === null ? undefined : this.objects.get(this.selected);
+    if (object) this.loosened.add(object.group);
+    this.gizmo.place();
+    this.tell('selection');
   }
 
   /** Places of what is selected after a motion of the world. */

@@ -97,7 +97,7 @@ export class Marks {
     if (this.ring) discard(this.ring);
     this.ring = null;
     if (hit) {
-      const size = 0.012 * Math.max(hit.distance, 0.05);
+      const size = 0.009 * Math.max(hit.distance, 0.05);
       const ring = (inner: number, outer: number, colour: number, order: number) => {
         const mesh = new Mesh(new RingGeometry(inner * size, outer * size, 40), new MeshBasicMaterial({ color: colour, depthTest: false, transparent: true, side: 2, toneMapped: false }));
         mesh.renderOrder = order;

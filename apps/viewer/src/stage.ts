@@ -63,6 +63,8 @@ export class Stage {
   private coarseness = 0;
   private drawn = 0;
   private row = 0;
+  /** Vertical angle of view that was asked for, radians. */
+  private fov = 0.87;
   private lastFrame = 0;
 
   constructor() {
@@ -200,6 +202,13 @@ export class Stage {
     this.frames += 1;
   }
 
+  /** The angle of view: on upright screens it holds across, where else the sides would be lost. */
+  private widen(): void {
+    const half = Math.tan(0.5 * this.fov) / Math.min(1, this.camera.aspect);
+    this.camera.fov = (2 * Math.atan(half) * 180) / Math.PI;
+    this.camera.updateProjectionMatrix();
+  }
+
   private resize(coarseness: number): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
@@ -207,7 +216,7 @@ export class Stage {
     this.renderer.setPixelRatio(SHARPNESS[coarseness] * Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.widen();
     this.dirty = true;
   }
 
@@ -259,8 +268,8 @@ export class Stage {
   look(place: CameraPlace): void {
     const world = this.root.matrixWorld.clone().multiply(new Matrix4().fromArray(place.matrix));
     world.decompose(this.camera.position, this.camera.quaternion, new Vector3());
-    this.camera.fov = (place.fov * 180) / Math.PI;
-    this.camera.updateProjectionMatrix();
+    this.fov = place.fov;
+    this.widen();
     this.camera.updateMatrixWorld();
     this.change();
   }
@@ -269,7 +278,7 @@ export class Stage {
   place(name: string): CameraPlace {
     this.camera.updateMatrixWorld();
     const matrix = this.root.matrixWorld.clone().invert().multiply(this.camera.matrixWorld);
-    return { name, matrix: matrix.toArray(), fov: (this.camera.fov * Math.PI) / 180 };
+    return { name, matrix: matrix.toArray(), fov: this.fov };
   }
 
   /** What the eye is exposed to. */

@@ -24,6 +24,9 @@ const LONGEST_NAME: usize = 80;
 const MOST_SOURCES: usize = 6;
 const LEAST_SHARE: f32 = 1e-3;
 
+/// A remainder below this is that of small sources.
+const LEAST_TOLD: f32 = 0.02;
+
 /// What pages ask of the solver.
 pub enum Command {
     /// A message of a page, and where the answer goes.
@@ -351,12 +354,18 @@ impl Solver {
         let lights = probe.lights.iter().map(|(id, bands)| (light(*id), share(*bands)));
         let straight = ("straight from lights".to_owned(), share(probe.direct));
         let surfaces = probe.objects.iter().map(|(id, bands)| (object(*id), share(*bands)));
+        let mut lights = shares(lights);
+        // Reflections are sorted by light only when all else is done.
+        let rest = 1.0 - lights.iter().map(|known| known.share).sum::<f32>();
+        if !lights.is_empty() && rest > LEAST_TOLD {
+            lights.push(Share { name: "not told apart yet".to_owned(), share: rest });
+        }
         ProbeAnswer {
             illuminance: probe.lux,
             irradiance: probe.irradiance,
             reflectance: probe.reflectance,
             radiosity: probe.radiosity,
-            lights: shares(lights),
+            lights,
             surfaces: shares(std::iter::once(straight).chain(surfaces)),
         }
     }

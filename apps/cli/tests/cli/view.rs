@@ -17,8 +17,8 @@ struct Served {
 }
 
 impl Served {
-    fn start(room: &Room, options: &[&str]) -> Served {
-        let call = ["view", "--json", "--no-open", "--elements", "200", "--rays", "8"].iter().chain(options);
+    fn start(room: &Room, elements: &str) -> Served {
+        let call = ["view", "--json", "--no-open", "--elements", elements, "--rays", "8"];
         let mut child = room.command(call).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let mut out = BufReader::new(child.stdout.take().unwrap());
         let url = loop {
@@ -147,7 +147,7 @@ impl Socket {
 #[test]
 fn only_who_has_the_token_and_the_right_name_is_answered() {
     let room = Room::new("view-guard");
-    let served = Served::start(&room, &[]);
+    let served = Served::start(&room, "200");
     let (host, token) = (served.host(), served.token.clone());
     let page = format!("GET /{token}/");
     let own = ("Host", host.as_str());
@@ -178,7 +178,7 @@ fn only_who_has_the_token_and_the_right_name_is_answered() {
 #[test]
 fn malformed_messages_are_refused_and_the_next_is_heard() {
     let room = Room::new("view-messages");
-    let served = Served::start(&room, &[]);
+    let served = Served::start(&room, "200");
     let mut socket = served.socket();
     let name = socket.hear_of("scene")["name"].clone();
     socket.hear_of("caught_up");
@@ -201,10 +201,12 @@ fn malformed_messages_are_refused_and_the_next_is_heard() {
 #[test]
 fn a_page_that_does_not_read_holds_nobody_back() {
     let room = Room::new("view-slow");
-    let served = Served::start(&room, &[]);
+    // Each change is then 100 kB of light, more in all than the system keeps for a reader.
+    let served = Served::start(&room, "20000");
     let mut slow = served.socket();
     slow.say(r#"{"kind":"layer","layer":"total","epoch":1}"#);
     let mut quick = served.socket();
+    quick.say(r#"{"kind":"layer","layer":"total","epoch":1}"#);
     quick.hear_of("caught_up");
     for step in 0..200 {
         let dimming = 1.0 - f64::from(step) / 400.0;
@@ -225,7 +227,7 @@ fn a_page_that_does_not_read_holds_nobody_back() {
 #[test]
 fn an_interrupt_ends_it_well() {
     let room = Room::new("view-interrupt");
-    let mut served = Served::start(&room, &[]);
+    let mut served = Served::start(&room, "200");
     let mut socket = served.socket();
     socket.hear_of("caught_up");
     let kill = std::process::Command::new("kill").args(["-INT", &served.child.id().to_string()]).status().unwrap();
@@ -238,7 +240,7 @@ fn an_interrupt_ends_it_well() {
 #[test]
 fn a_port_that_is_taken_is_a_wrong_call() {
     let room = Room::new("view-port");
-    let served = Served::start(&room, &[]);
+    let served = Served::start(&room, "200");
     let run = room.run(["view", "--no-open", "--port", &served.port.to_string()]);
     assert_eq!(run.code, Some(2), "{run:?}");
     assert!(run.err.contains("cannot listen there"), "{run:?}");

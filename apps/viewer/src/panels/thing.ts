@@ -49,7 +49,7 @@ export function thingPanel(app: App): HTMLElement {
     el('div', { class: 'row' }, mode),
     el('div', { class: 'numbers' }, ...places.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'XYZ'[k]), input)),
       el('label', {}, el('span', { class: 'quiet' }, '°'), turn)));
-  const fixed = el('p', { class: 'quiet' }, 'It stays where it is.');
+  const fixed = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Large, so it stays put.'), button('Let it move', () => app.loosen()));
   const painting = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Reflectance'), paint, reflectance, el('span', { class: 'unit' }, '%'));
   const body = el('div', {}, name, painting, moving, fixed, el('div', { class: 'row' }, copy, remove));
   const none = el('p', { class: 'quiet' }, 'Click a thing, or press Enter for what is under the cross.');
