@@ -72,7 +72,14 @@ fn install(viewer: &Path) -> Result<(), Fault> {
 
 fn build(viewer: &Path, folder: &str) -> Result<(), Fault> {
     run(Command::new("npx").current_dir(viewer).arg("tsc"))?;
-    run(Command::new("npx").current_dir(viewer).args(["vite", "build", "--logLevel=warn", "--emptyOutDir", "--outDir", folder]))
+    run(Command::new("npx").current_dir(viewer).args([
+        "vite",
+        "build",
+        "--logLevel=warn",
+        "--emptyOutDir",
+        "--outDir",
+        folder,
+    ]))
 }
 
 /// The browser that is asked for by `CHROMIUM`, or one that is installed.
@@ -80,10 +87,13 @@ fn browser() -> Result<PathBuf, Fault> {
     if let Some(asked) = std::env::var_os("CHROMIUM") {
         return Ok(asked.into());
     }
-    let folders: Vec<PathBuf> = std::env::var_os("PATH").map(|path| std::env::split_paths(&path).collect()).unwrap_or_default();
+    let folders: Vec<PathBuf> =
+        std::env::var_os("PATH").map(|path| std::env::split_paths(&path).collect()).unwrap_or_default();
     let places = BROWSERS.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
     places.into_iter().find(|place| place.is_file()).ok_or_else(|| {
-        Fault::Viewer("the tests need Chromium; install it (Debian: apt install chromium), or name it by CHROMIUM".to_owned())
+        Fault::Viewer(
+            "the tests need Chromium; install it (Debian: apt install chromium), or name it by CHROMIUM".to_owned(),
+        )
     })
 }
 

@@ -123,8 +123,8 @@ fn work(cli: &Cli, progress: &progress::Progress) -> Result<(), Failure> {
         pool.build_global().map_err(|error| Failure::input(format!("--threads {threads}: {error}")))?;
     }
     // `view` has nothing to save and ends in its own way.
-    let listens = matches!(cli.verb, Verb::View(_));
-    if let Err(error) = if listens { Ok(()) } else { progress.listen_for_interrupts() } {
+    let ends_itself = matches!(cli.verb, Verb::View(_));
+    if !ends_itself && let Err(error) = progress.listen_for_interrupts() {
         output::complain(&format!("warning: Ctrl-C may leave temporary files: {error}"));
     }
     match &cli.verb {

@@ -28,7 +28,8 @@ pub fn lit(export: Export) -> Result<Vec<u8>, WriteError> {
         let place = DMat4::from_cols_array(&object.matrix);
         let normals = place.inverse().transpose();
         scene.positions.extend(object.positions.iter().map(|p| place.transform_point3(DVec3::from(p.map(f64::from)))));
-        let turn = |n: &[f32; 3]| normals.transform_vector3(DVec3::from(n.map(f64::from))).normalize_or_zero().as_vec3();
+        let turn =
+            |n: &[f32; 3]| normals.transform_vector3(DVec3::from(n.map(f64::from))).normalize_or_zero().as_vec3();
         scene.normals.extend(object.normals.iter().map(turn));
         let triangles: Vec<[u32; 3]> = object.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
         let index = scene.objects.len();

@@ -88,7 +88,9 @@ pub fn targets(edit: &Edit) -> Vec<Target> {
         Edit::MoveLight { light, .. } => vec![Target::LightPlace(*light)],
         Edit::Reflectance { object, .. } => vec![Target::Paint(*object)],
         Edit::Move { object, .. } => vec![Target::Place(*object)],
-        Edit::Copy { object, .. } | Edit::Delete { object } | Edit::Restore { object } => vec![Target::Presence(*object)],
+        Edit::Copy { object, .. } | Edit::Delete { object } | Edit::Restore { object } => {
+            vec![Target::Presence(*object)]
+        }
         Edit::Several(edits) => edits.iter().flat_map(targets).collect(),
     }
 }

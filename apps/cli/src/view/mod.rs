@@ -21,7 +21,7 @@ use board::Board;
 use clap::Args;
 use guard::Guard;
 use radiosity::session::{Session, SessionOptions};
-use radiosity::{Projection, Tracer};
+use radiosity::{Camera, Projection, Tracer};
 use serde_json::json;
 use server::Server;
 use solver::Command;
@@ -88,7 +88,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
 
     progress.part("reading");
     let input = input::load(&arguments.scene, global, progress)?;
-    let placed = placed_camera(&input);
+    let has_view = |camera: &Camera| matches!(camera.projection, Projection::Perspective { .. });
+    let placed = (!input.scene.cameras.iter().any(has_view)).then(|| placed_camera(&input));
     let options = SessionOptions {
         element_size: arguments.element_size,
         elements: arguments.elements,

@@ -100,7 +100,8 @@ async fn page() -> Response {
          connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     );
     let html = PAGE.replace(NONCE, &format!("nonce=\"{nonce}\""));
-    let headers = [(header::CONTENT_TYPE, "text/html; charset=utf-8".to_owned()), (header::CONTENT_SECURITY_POLICY, policy)];
+    let headers =
+        [(header::CONTENT_TYPE, "text/html; charset=utf-8".to_owned()), (header::CONTENT_SECURITY_POLICY, policy)];
     (headers, html).into_response()
 }
 
@@ -288,4 +289,3 @@ fn refuse(answer: &mpsc::Sender<String>, what: &str) -> bool {
     let _ = answer.try_send(Say::Refused { message }.text());
     true
 }
-

@@ -71,7 +71,7 @@ struct Solver {
 }
 
 /// Works until it is told to stop.
-pub fn run(session: Session, placed: CameraPlace, board: Arc<Board>, mut commands: mpsc::Receiver<Command>) {
+pub fn run(session: Session, placed: Option<CameraPlace>, board: Arc<Board>, mut commands: mpsc::Receiver<Command>) {
     let model = session.model();
     let mut solver = Solver {
         session,
@@ -252,13 +252,13 @@ impl Solver {
         self.board.post(subject, Notice::Text(text));
     }
 
-    fn post_scene(&mut self, placed: CameraPlace) {
+    fn post_scene(&mut self, placed: Option<CameraPlace>) {
         let [low, high] = self.model.bounds;
         let own = self.model.cameras.iter().filter_map(|camera| {
             Some(CameraPlace { name: camera.name.clone(), matrix: camera.matrix, fov: camera.vertical_fov? })
         });
         let mut cameras: Vec<CameraPlace> = own.collect();
-        cameras.push(placed);
+        cameras.extend(placed);
         let text = Say::Scene {
             name: &self.model.name,
             version: env!("CARGO_PKG_VERSION"),

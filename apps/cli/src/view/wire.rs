@@ -50,15 +50,31 @@ pub enum Request {
     Undo,
     Redo,
     /// Looks at another layer of light.
-    Layer { layer: Layer, epoch: u32 },
+    Layer {
+        layer: Layer,
+        epoch: u32,
+    },
     /// Measures at a place of an object.
-    Probe { question: u64, object: ObjectId, triangle: u32, uv: [f32; 2] },
+    Probe {
+        question: u64,
+        object: ObjectId,
+        triangle: u32,
+        uv: [f32; 2],
+    },
     /// Asks for the rays of an element.
-    Rays { question: u64, object: ObjectId, triangle: u32 },
+    Rays {
+        question: u64,
+        object: ObjectId,
+        triangle: u32,
+    },
     /// Keeps a camera, in place of one of the same name.
-    Bookmark { camera: CameraPlace },
+    Bookmark {
+        camera: CameraPlace,
+    },
     /// Gives one up.
-    Forget { name: String },
+    Forget {
+        name: String,
+    },
 }
 
 /// Everything that the server says, but light and triangles.
@@ -190,18 +206,15 @@ impl TextureUse {
             Wrap::Mirror => "mirror",
             Wrap::Clamp => "clamp",
         };
-        TextureUse {
-            index: texture.texture,
-            wrap: texture.wrap.map(name),
-            nearest: texture.nearest,
-        }
+        TextureUse { index: texture.texture, wrap: texture.wrap.map(name), nearest: texture.nearest }
     }
 }
 
 /// An object, without its triangles.
 pub fn object(object: &ModelObject, scene: &Scene) -> String {
     let of_scene = object.triangle_of.first().map(|&t| scene.material(t as usize));
-    let texture = of_scene.and_then(|material| material.base_color_texture.as_ref()).filter(|_| object.texture.is_some());
+    let texture =
+        of_scene.and_then(|material| material.base_color_texture.as_ref()).filter(|_| object.texture.is_some());
     // Metal's share of the base colour is no diffuse reflectance.
     let diffuse = of_scene.map_or(1.0, |material| 1.0 - material.metallic);
     let tint = if texture.is_some() { object.tint.map(|t| t * diffuse) } else { object.reflectance };

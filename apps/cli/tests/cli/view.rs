@@ -183,7 +183,9 @@ fn malformed_messages_are_refused_and_the_next_is_heard() {
     let name = socket.hear_of("scene")["name"].clone();
     socket.hear_of("caught_up");
     let deep = "[".repeat(100_000);
-    for wrong in ["", "{", "\u{0}", r#"{"kind":"nothing"}"#, r#"{"kind":"edit","edit":{"delete":{"object":77777}}}"#, &deep] {
+    for wrong in
+        ["", "{", "\u{0}", r#"{"kind":"nothing"}"#, r#"{"kind":"edit","edit":{"delete":{"object":77777}}}"#, &deep]
+    {
         socket.say(wrong);
         assert!(!socket.hear_of("refused")["message"].as_str().unwrap().is_empty());
     }

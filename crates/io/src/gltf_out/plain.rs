@@ -5,7 +5,9 @@ use super::materials::{Materials, unit};
 use super::mixture::{Mixture, mixture};
 use super::{Light, LitPrimitive, LitVertex, Style, WriteError, lamps, vertices};
 use glam::{DVec2, Vec3};
-use radiosity_scene::{AlphaMode, Camera, Material, Object, PointLight, Projection, Scene, Texture, TextureRef, Up, Wrap};
+use radiosity_scene::{
+    AlphaMode, Camera, Material, Object, PointLight, Projection, Scene, Texture, TextureRef, Up, Wrap,
+};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
