@@ -5,7 +5,7 @@ import { Gizmo } from './gizmo';
 import { grid, type Grid } from './grid';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
-import { Stage, type Hit } from './stage';
+import { corners, Stage, type Hit } from './stage';
 import { Mode, shared, Surface } from './surface';
 import {
   Connection, type CameraPlace, type Edit, type Layer, type LightFrame, type LightNotice, type MeshFrame, type Notice,
@@ -172,7 +172,7 @@ export class App {
     if (!this.gizmo.isDragging || !this.group().includes(surface)) {
       surface.matrix.fromArray(object.matrix);
       this.stage.moved(surface);
-      this.marks.follow(surface);
+      this.followed(surface);
     }
     if (object.deleted && this.selected === id) this.select(null);
     else if (this.group().includes(surface)) {
@@ -299,7 +299,7 @@ export class App {
       object.matrix = matrix.toArray();
       surface.matrix.copy(matrix);
       this.stage.moved(surface);
-      this.marks.follow(surface);
+      this.followed(surface);
       edits.push({ move: { object: object.id, matrix: object.matrix } });
     }
     if (edits.length === 0) return;
@@ -384,6 +384,18 @@ export class App {
     this.select(hit.surface.object);
     this.askProbe();
     this.tell('probe');
+  }
+
+  /** What is marked on a surface goes with it. */
+  private followed(surface: Surface): void {
+    this.marks.follow(surface);
+    const hit = this.probed?.hit;
+    if (hit?.surface !== surface) return;
+    const [a, b, c] = corners(surface, hit.triangle).map((corner) => corner.applyMatrix4(surface.matrixWorld));
+    const [v, w] = hit.uv;
+    hit.point.copy(a).multiplyScalar(1 - v - w).addScaledVector(b, v).addScaledVector(c, w);
+    hit.normal.copy(b.sub(a).cross(c.sub(a)).normalize());
+    this.marks.point(hit);
   }
 
   private askProbe(): void {

@@ -2,7 +2,7 @@
 import { Matrix4, Object3D, Quaternion, Vector3 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { App } from './app';
-import { ACCENT } from './marks';
+import { ACCENT } from './stage';
 import type { Surface } from './surface';
 
 export class Gizmo {

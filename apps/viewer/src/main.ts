@@ -27,7 +27,7 @@ function start(): void {
     document.querySelector('#fold')?.setAttribute('aria-expanded', String(!isFolded));
   };
   const panel = el('aside', { class: 'panel', 'aria-label': 'Tools' },
-    viewPanel(app), lightsPanel(app), meterPanel(app), thingPanel(app), gridPanel(app), camerasPanel(app));
+    viewPanel(app), meterPanel(app), thingPanel(app), lightsPanel(app), gridPanel(app), camerasPanel(app));
   const doing = el('span', { id: 'doing', role: 'status' });
   const message = el('span', { id: 'message', role: 'alert' });
   const numbers = gridNumbers(app);

@@ -1,20 +1,14 @@
 // What is drawn over the scene: the probe, the outline of what is selected, edges of elements, rays, a grid, lights without area.
 import {
-  BoxHelper, BufferAttribute, BufferGeometry, CanvasTexture, Color, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh,
-  MeshBasicMaterial, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, Vector3, WireframeGeometry, type Object3D,
+  BufferAttribute, BufferGeometry, CanvasTexture, Color, Group, LineBasicMaterial, LineSegments, Mesh,
+  MeshBasicMaterial, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, Vector3, WireframeGeometry,
 } from 'three';
 import type { Grid } from './grid';
-import { discard, type Hit, type Stage } from './stage';
+import { ACCENT, discard, type Hit, type Stage } from './stage';
 import type { Surface } from './surface';
 import type { LightNotice } from './wire';
 
-export const ACCENT = 0xe8b04a;
-
-/** More triangles than this are outlined by a box: their edges would take long to find. */
-const OUTLINED = 60_000;
-
 export class Marks {
-  private outlined = new Map<Surface, Object3D>();
   private wires = new Map<number, LineSegments>();
   private ring: Group | null = null;
   private lines: LineSegments | null = null;
@@ -24,38 +18,14 @@ export class Marks {
 
   constructor(private stage: Stage) {}
 
-  /** The edges of what is selected. */
+  /** A line around what is selected. */
   outline(surfaces: Surface[]): void {
-    const same = surfaces.length === this.outlined.size && surfaces.every((surface) => this.outlined.has(surface));
-    if (!same) {
-      for (const outline of this.outlined.values()) discard(outline);
-      this.outlined.clear();
-      for (const surface of surfaces) this.outlined.set(surface, this.outlineOf(surface));
-    }
-    surfaces.forEach((surface) => this.follow(surface));
+    this.stage.outline.set(surfaces);
     this.stage.change();
-  }
-
-  private outlineOf(surface: Surface): Object3D {
-    if (surface.geometry.index!.count / 3 > OUTLINED) {
-      const box = new BoxHelper(surface, ACCENT);
-      this.stage.tools.add(box);
-      return box;
-    }
-    const material = new LineBasicMaterial({ color: ACCENT, transparent: true, opacity: 0.9, depthTest: false });
-    const lines = new LineSegments(new EdgesGeometry(surface.geometry, 20), material);
-    lines.matrixAutoUpdate = false;
-    lines.renderOrder = 3;
-    this.stage.overlay.add(lines);
-    return lines;
   }
 
   /** A surface has moved. */
   follow(surface: Surface): void {
-    const outline = this.outlined.get(surface);
-    if (outline instanceof BoxHelper) outline.update();
-    else outline?.matrix.copy(surface.matrix);
-    if (outline) outline.matrixWorldNeedsUpdate = true;
     const wires = this.wires.get(surface.object);
     wires?.matrix.copy(surface.matrix);
     if (wires) wires.matrixWorldNeedsUpdate = true;

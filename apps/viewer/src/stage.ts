@@ -4,8 +4,12 @@ import {
   Quaternion, Ray, RepeatWrapping, RGBAFormat, Scene, ShaderMaterial, type Side, SphereGeometry, Vector2, Vector3, WebGLRenderer,
   WebGLRenderTarget,
 } from 'three';
+import { Outline } from './outline';
 import { DISPLAY, Mode, shared, type Surface } from './surface';
 import type { CameraPlace, SceneNotice } from './wire';
+
+/** The colour of what is marked. */
+export const ACCENT = 0xe8b04a;
 
 /** Where a ray ended. */
 export interface Hit {
@@ -53,6 +57,7 @@ export class Stage {
   /** Things that stand in the overlay but not in the scene's axes. */
   readonly tools = new Group();
   readonly bounds = new Box3(new Vector3(-1, 0, -1), new Vector3(1, 2, 1));
+  readonly outline = new Outline(ACCENT);
   frames = 0;
   private dirty = true;
   private boxes = new Map<number, Box3>();
@@ -107,6 +112,7 @@ export class Stage {
     this.sky.frustumCulled = false;
     this.scene.add(this.sky, this.root, this.tools);
     this.root.add(this.overlay);
+    this.tools.add(this.outline.line);
     new ResizeObserver(() => {
       this.resize(0);
       this.drawNow();
@@ -179,6 +185,7 @@ export class Stage {
     this.dirty = false;
     this.pace(now - this.lastFrame);
     this.lastFrame = now;
+    this.outline.prepare(this.renderer, this.scene, this.camera);
     this.renderer.render(this.scene, this.camera);
     this.frames += 1;
   }
@@ -198,6 +205,7 @@ export class Stage {
 
   /** Draws now, whatever has changed, for who counts frames or reads pixels. */
   drawNow(): void {
+    this.outline.prepare(this.renderer, this.scene, this.camera);
     this.renderer.render(this.scene, this.camera);
     this.frames += 1;
   }

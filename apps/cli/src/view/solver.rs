@@ -318,6 +318,7 @@ impl Solver {
             },
             (false, true) => "Following the change".to_owned(),
             (false, false) if status.rays == 0 => "First light".to_owned(),
+            (false, false) if status.rays == status.most_rays => "Telling lights apart".to_owned(),
             (false, false) => format!("Tracing rays: {} of {} an element", status.rays, status.most_rays),
         };
         let status = wire::Status {
