@@ -43,6 +43,8 @@ export class App {
   redoable: string | null = null;
   isConnected = false;
   isCaughtUp = false;
+  /** Milliseconds from the beginning of the page to the whole scene. */
+  opened: number | null = null;
   layer: Layer = 'total';
   falseColours = false;
   edges = false;
@@ -150,6 +152,7 @@ export class App {
 
   private begin(): void {
     this.isCaughtUp = true;
+    this.opened ??= performance.now();
     if (this.selected === null) this.navigator.choose();
     this.tell('view');
     this.tell('connection');

@@ -46,6 +46,7 @@ export function tests(app: App) {
     },
     state: () => ({
       isCaughtUp: app.isCaughtUp,
+      opened: app.opened,
       isConnected: app.isConnected,
       status: app.status,
       message: app.message,
