@@ -524,8 +524,10 @@ fn a_dark_scene_keeps_its_lamps_and_cameras() {
         range,
     };
     use radiosity_scene::PointLightKind as Kind;
-    let mut scene = Scene::default();
-    scene.materials = vec![Material { emissive: [1000.0, 500.0, 0.0], ..Material::default() }];
+    let mut scene = Scene {
+        materials: vec![Material { emissive: [1000.0, 500.0, 0.0], ..Material::default() }],
+        ..Scene::default()
+    };
     scene.add_quad("floor", 0, [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y]);
     scene.lights = vec![
         lamp("bulb", Kind::Point, Some(4.0)),
