@@ -427,6 +427,7 @@ export class App {
   }
 
   showLayer(layer: Layer): void {
+    if (JSON.stringify(layer) === JSON.stringify(this.layer)) return;
     this.layer = layer;
     // Light of the last layer would be taken for that of this one.
     for (const surface of this.stage.surfaces.values()) surface.shine(0, new Uint16Array(surface.light.array.length));
