@@ -216,10 +216,10 @@ async fn serve(place: Place, mut socket: WebSocket) {
             }
         }
         let is_owed_more = next.is_some();
-        if let Some(message) = next {
-            if !send(&mut socket, message).await {
-                return;
-            }
+        if let Some(message) = next
+            && !send(&mut socket, message).await
+        {
+            return;
         }
         tokio::select! {
             biased;
