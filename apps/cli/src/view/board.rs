@@ -87,6 +87,8 @@ impl<K: Copy + Eq + std::hash::Hash, V: PartialEq> Latest<K, V> {
 #[derive(Default)]
 struct Watched {
     pages: usize,
+    /// The solver has taken notice of it.
+    is_known: bool,
     light: Latest<(u32, u32), LightChunk>,
 }
 
@@ -171,7 +173,7 @@ impl Board {
         let mut posts = self.lock();
         match posts.layers.iter_mut().find(|(of, _)| *of == layer) {
             Some((_, watched)) => watched.pages += 1,
-            None => posts.layers.push((layer, Watched { pages: 1, light: Latest::default() })),
+            None => posts.layers.push((layer, Watched { pages: 1, ..Watched::default() })),
         }
     }
 
@@ -184,9 +186,16 @@ impl Board {
         posts.layers.retain(|(_, watched)| watched.pages > 0);
     }
 
-    /// Layers that pages look at.
-    pub fn layers(&self) -> Vec<Layer> {
-        self.lock().layers.iter().map(|(layer, _)| *layer).collect()
+    /// Layers that pages look at, and of each whether it is new since this was asked last: all its light is to be posted
+    /// then. One that nobody looked at for a moment is new again, as its light was not kept.
+    pub fn layers(&self) -> Vec<(Layer, bool)> {
+        let known = |watched: &mut Watched| !std::mem::replace(&mut watched.is_known, true);
+        self.lock().layers.iter_mut().map(|(layer, watched)| (*layer, known(watched))).collect()
+    }
+
+    /// Whether there is a layer that is new.
+    pub fn has_new_layer(&self) -> bool {
+        self.lock().layers.iter().any(|(_, watched)| !watched.is_known)
     }
 
     /// The next notice that a page has not seen.
@@ -258,6 +267,11 @@ mod tests {
         let news = board.next_light(layer, &mut seen);
         assert_eq!(news.len(), 1);
         assert_eq!((news[0].object, news[0].first), (7, CHUNK as u32));
+        assert_eq!(board.layers(), [(layer, true)]);
+        assert_eq!(board.layers(), [(layer, false)]);
+        board.unwatch(layer);
+        board.watch(layer);
+        assert_eq!(board.layers(), [(layer, true)], "its light was not kept meanwhile");
         board.unwatch(layer);
         assert!(board.layers().is_empty());
     }

@@ -24,7 +24,7 @@ use radiosity::session::{Session, SessionOptions};
 use radiosity::{Camera, Projection, Tracer};
 use serde_json::json;
 use server::Server;
-use solver::Command;
+use solver::{Command, Solver};
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
@@ -104,7 +104,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let guard = Guard::new(&arguments.host).map_err(Failure::work)?;
     let token = guard.token().to_owned();
     let server = Server::new(guard, board.clone(), commands.clone(), session.scene());
-    let solver = std::thread::spawn(move || solver::run(session, placed, board, asked));
+    let solver = Solver::new(session, placed, board);
+    let solver = std::thread::spawn(move || solver.run(asked));
     progress.finish();
 
     let url = address(&listener, &token)?;

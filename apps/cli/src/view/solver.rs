@@ -50,7 +50,7 @@ pub struct Export {
 }
 
 /// The state of the thread.
-struct Solver {
+pub struct Solver {
     session: Session,
     model: Model,
     board: Arc<Board>,
@@ -58,8 +58,6 @@ struct Solver {
     cameras: Vec<CameraPlace>,
     /// Objects whose light is not yet posted.
     changed: BTreeSet<ObjectId>,
-    /// Layers of which everything was posted once.
-    posted: Vec<Layer>,
     last_post: Option<Instant>,
     is_done: bool,
     edits: u64,
@@ -68,46 +66,6 @@ struct Solver {
     latency: Option<f64>,
     /// Since when rays have been traced without a change, and how many there were.
     since: (Instant, u32),
-}
-
-/// Works until it is told to stop.
-pub fn run(session: Session, placed: Option<CameraPlace>, board: Arc<Board>, mut commands: mpsc::Receiver<Command>) {
-    let model = session.model();
-    let mut solver = Solver {
-        session,
-        model,
-        board,
-        history: History::default(),
-        cameras: Vec::new(),
-        changed: BTreeSet::new(),
-        posted: Vec::new(),
-        last_post: None,
-        is_done: false,
-        edits: 0,
-        edited: None,
-        latency: None,
-        since: (Instant::now(), 0),
-    };
-    solver.post_scene(placed);
-    solver.post_status();
-    loop {
-        let mut waiting: Vec<Command> = Vec::new();
-        if solver.is_done {
-            match commands.blocking_recv() {
-                Some(command) => waiting.push(command),
-                None => return,
-            }
-        }
-        while let Ok(command) = commands.try_recv() {
-            waiting.push(command);
-        }
-        for at in 0..waiting.len() {
-            if !is_outdated(&waiting[at..]) && !solver.obey(&mut waiting[at]) {
-                return;
-            }
-        }
-        solver.work();
-    }
 }
 
 /// Whether the first command is an edit that the next one makes anew.
@@ -125,6 +83,50 @@ fn is_outdated(commands: &[Command]) -> bool {
 }
 
 impl Solver {
+    /// With the whole scene on the board, dark: a page that comes then finds it.
+    pub fn new(session: Session, placed: Option<CameraPlace>, board: Arc<Board>) -> Solver {
+        let model = session.model();
+        let mut solver = Solver {
+            session,
+            model,
+            board,
+            history: History::default(),
+            cameras: Vec::new(),
+            changed: BTreeSet::new(),
+            last_post: None,
+            is_done: false,
+            edits: 0,
+            edited: None,
+            latency: None,
+            since: (Instant::now(), 0),
+        };
+        solver.post_scene(placed);
+        solver.post_status();
+        solver
+    }
+
+    /// Works until it is told to stop.
+    pub fn run(mut self, mut commands: mpsc::Receiver<Command>) {
+        loop {
+            let mut waiting: Vec<Command> = Vec::new();
+            if self.is_done {
+                match commands.blocking_recv() {
+                    Some(command) => waiting.push(command),
+                    None => return,
+                }
+            }
+            while let Ok(command) = commands.try_recv() {
+                waiting.push(command);
+            }
+            for at in 0..waiting.len() {
+                if !is_outdated(&waiting[at..]) && !self.obey(&mut waiting[at]) {
+                    return;
+                }
+            }
+            self.work();
+        }
+    }
+
     /// Does what is asked; whether to go on.
     fn obey(&mut self, command: &mut Command) -> bool {
         match command {
@@ -223,22 +225,18 @@ impl Solver {
             self.changed.extend(step.changed);
             (self.is_done, is_complete) = (step.is_done, step.is_complete || step.is_done);
         }
-        let layers = self.board.layers();
-        let is_new = |layer: &Layer| !self.posted.contains(layer);
         let due = self.last_post.is_none_or(|last| last.elapsed() >= EVERY);
-        if !(due || self.is_done || layers.iter().any(is_new) || (is_complete && self.edited.is_some())) {
+        if !(due || self.is_done || self.board.has_new_layer() || (is_complete && self.edited.is_some())) {
             return;
         }
-        for layer in &layers {
-            let is_new = !self.posted.contains(layer);
+        for (layer, is_new) in self.board.layers() {
             for object in &self.model.objects {
                 if (is_new || self.changed.contains(&object.id)) && !object.deleted {
-                    let light = wire::halves(&self.session.light(object.id, *layer));
-                    self.board.post_light(*layer, object.id.0, &light);
+                    let light = wire::halves(&self.session.light(object.id, layer));
+                    self.board.post_light(layer, object.id.0, &light);
                 }
             }
         }
-        self.posted = layers;
         self.changed.clear();
         self.last_post = Some(Instant::now());
         if let Some(edited) = self.edited.filter(|_| is_complete) {
