@@ -60,7 +60,7 @@ export class App {
   private textures = new Map<string, Texture>();
   private question = 0;
   private gesture = 0;
-  private pending: { edit: Edit; timer: number } | null = null;
+  private pending: { gesture?: number; send: () => void; timer: number } | null = null;
   private lastSent = 0;
 
   constructor() {
@@ -224,16 +224,28 @@ export class App {
 
   /** Changes the scene. Edits of one gesture, such as a drag, are sent at a steady pace and undone together. */
   edit(edit: Edit, gesture?: number): void {
-    if (this.pending) clearTimeout(this.pending.timer);
-    this.pending = null;
+    // What waits is outdated by an edit of the same gesture, and comes first before any other.
+    if (this.pending && this.pending.gesture === gesture) this.drop();
+    else this.flush();
     const wait = gesture === undefined ? 0 : this.lastSent + GESTURE - performance.now();
     const send = () => {
       this.pending = null;
       this.lastSent = performance.now();
       if (!this.connection.send({ kind: 'edit', edit, gesture })) this.say('Not connected: the change was not made.');
     };
-    if (wait > 0) this.pending = { edit, timer: setTimeout(send, wait) };
+    if (wait > 0) this.pending = { gesture, send, timer: setTimeout(send, wait) };
     else send();
+  }
+
+  private drop(): void {
+    if (this.pending) clearTimeout(this.pending.timer);
+    this.pending = null;
+  }
+
+  private flush(): void {
+    const send = this.pending?.send;
+    this.drop();
+    send?.();
   }
 
   /** The number of a new gesture. */
@@ -243,10 +255,12 @@ export class App {
   }
 
   undo(): void {
+    this.flush();
     this.connection.send({ kind: 'undo' });
   }
 
   redo(): void {
+    this.flush();
     this.connection.send({ kind: 'redo' });
   }
 

@@ -152,6 +152,30 @@ fn threads_change_nothing() {
     assert_eq!(run(1), run(2));
 }
 
+/// An edit before there are rays enough for a quick picture: every layer can be read, and a step is complete only when
+/// the light is that of the edit.
+#[test]
+fn an_early_edit_leaves_whole_rows() {
+    let mut session = Session::new(cornell_box(), &small()).unwrap();
+    while session.status().rays < 4 {
+        session.step(Duration::ZERO);
+    }
+    let before = session.light(ObjectId(0), Layer::Total);
+    session.apply(&Edit::Light { light: LightId(0), dimming: 0.5, colour: [1.0; 3] }).unwrap();
+    for _ in 0..100_000 {
+        let step = session.step(Duration::ZERO);
+        for layer in [Layer::Direct, Layer::Indirect, Layer::Bounce(1), Layer::Light(LightId(0))] {
+            assert!(!session.light(ObjectId(0), layer).is_empty());
+        }
+        if step.is_complete {
+            break;
+        }
+    }
+    let of = |light: &[Bands]| light.iter().map(|e| luminance(*e)).sum::<f32>();
+    let after = of(&session.light(ObjectId(0), Layer::Total)) / of(&before);
+    assert!((after - 0.5).abs() < 0.15, "{after}");
+}
+
 #[test]
 fn undo_restores_every_bit() {
     let mut session = Session::new(furnished(), &small()).unwrap();

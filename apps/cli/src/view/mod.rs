@@ -29,7 +29,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use wire::CameraPlace;
 
 /// Arguments of `view`.
@@ -105,12 +105,17 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let token = guard.token().to_owned();
     let server = Server::new(guard, board.clone(), commands.clone(), session.scene());
     let solver = Solver::new(session, placed, board);
-    let solver = std::thread::spawn(move || solver.run(asked));
+    // Dropped when the solver ends, however it does.
+    let (running, ended) = oneshot::channel::<()>();
+    let solver = std::thread::spawn(move || {
+        let _running = running;
+        solver.run(asked);
+    });
     progress.finish();
 
     let url = address(&listener, &token)?;
     announce(&url, arguments, global, progress)?;
-    runtime.block_on(serve(listener, &server, stopped))?;
+    runtime.block_on(serve(listener, &server, stopped, ended))?;
     // The solver may have ended by itself.
     let _ = commands.blocking_send(Command::Stop);
     runtime.shutdown_timeout(FAREWELL);
@@ -124,12 +129,18 @@ async fn listen(arguments: &Arguments) -> Result<TcpListener, Failure> {
         .map_err(|error| Failure::input(format!("--host {host} --port {port}: cannot listen there: {error}")))
 }
 
-/// Answers requests until the program is told to stop.
-async fn serve(listener: TcpListener, server: &Arc<Server>, mut stopped: mpsc::Receiver<()>) -> Result<(), Failure> {
+/// Answers requests until the program is told to stop, or the solver has ended.
+async fn serve(
+    listener: TcpListener,
+    server: &Arc<Server>,
+    mut stopped: mpsc::Receiver<()>,
+    ended: oneshot::Receiver<()>,
+) -> Result<(), Failure> {
     let serving = axum::serve(listener, server.router());
     tokio::select! {
         ended = serving => ended.map_err(Failure::work),
         _ = stopped.recv() => Ok(()),
+        _ = ended => Ok(()),
     }
 }
 

@@ -61,24 +61,23 @@ pub struct Solver {
     last_post: Option<Instant>,
     is_done: bool,
     edits: u64,
-    /// When the last edit was made, until its light is posted.
+    /// When the first edit came whose light is not yet posted.
     edited: Option<Instant>,
+    /// The last edit of a gesture that goes on, and when it came: it waits until what was made before is seen, or nothing
+    /// would be seen before the gesture ends.
+    held: Option<(Command, Instant)>,
     latency: Option<f64>,
     /// Since when rays have been traced without a change, and how many there were.
     since: (Instant, u32),
 }
 
-/// Whether the first command is an edit that the next one makes anew.
-fn is_outdated(commands: &[Command]) -> bool {
-    let gesture = |command: &Command| match command {
+/// What an edit of a gesture changes; one that changes the same makes it outdated.
+fn gesture(command: &Command) -> Option<(u64, u64, Vec<history::Target>)> {
+    match command {
         Command::Ask { page, request: Request::Edit { edit, gesture: Some(gesture) }, .. } => {
             Some((*page, *gesture, targets(edit)))
         }
         _ => None,
-    };
-    match commands {
-        [first, next, ..] => gesture(first).is_some_and(|first| gesture(next) == Some(first)),
-        _ => false,
     }
 }
 
@@ -97,6 +96,7 @@ impl Solver {
             is_done: false,
             edits: 0,
             edited: None,
+            held: None,
             latency: None,
             since: (Instant::now(), 0),
         };
@@ -109,7 +109,7 @@ impl Solver {
     pub fn run(mut self, mut commands: mpsc::Receiver<Command>) {
         loop {
             let mut waiting: Vec<Command> = Vec::new();
-            if self.is_done {
+            if self.is_done && self.held.is_none() {
                 match commands.blocking_recv() {
                     Some(command) => waiting.push(command),
                     None => return,
@@ -118,38 +118,60 @@ impl Solver {
             while let Ok(command) = commands.try_recv() {
                 waiting.push(command);
             }
-            for at in 0..waiting.len() {
-                if !is_outdated(&waiting[at..]) && !self.obey(&mut waiting[at]) {
+            for command in waiting {
+                if !self.take(command) {
                     return;
                 }
+            }
+            if self.edited.is_none() && !self.release() {
+                return;
             }
             self.work();
         }
     }
 
-    /// Does what is asked; whether to go on.
-    fn obey(&mut self, command: &mut Command) -> bool {
+    /// Does what is asked, at once or, of a gesture that goes on, when the last picture is there; whether to go on.
+    fn take(&mut self, command: Command) -> bool {
+        let Some(of) = gesture(&command) else { return self.release() && self.obey(command, Instant::now()) };
+        let is_same = self.held.as_ref().is_some_and(|(held, _)| gesture(held) == Some(of));
+        if !is_same && !self.release() {
+            return false;
+        }
+        let since = self.held.take().map_or_else(Instant::now, |(_, since)| since);
+        self.held = Some((command, since));
+        true
+    }
+
+    /// Makes the edit that waits; whether to go on.
+    fn release(&mut self) -> bool {
+        match self.held.take() {
+            Some((command, since)) => self.obey(command, since),
+            None => true,
+        }
+    }
+
+    /// Does what was asked at a time; whether to go on.
+    fn obey(&mut self, command: Command, since: Instant) -> bool {
         match command {
             Command::Ask { page, request, answer } => {
-                if let Some(text) = self.answer(*page, request) {
+                if let Some(text) = self.answer(page, &request, since) {
                     // A page that does not read its answers misses them.
                     let _ = answer.try_send(text);
                 }
             }
             Command::Watch => {}
             Command::Export(wanted) => {
-                let (sender, _) = oneshot::channel();
                 // Whoever has gone away needs nothing.
-                let _ = std::mem::replace(wanted, sender).send(self.export());
+                let _ = wanted.send(self.export());
             }
             Command::Stop => return false,
         }
         true
     }
 
-    fn answer(&mut self, page: u64, request: &Request) -> Option<String> {
+    fn answer(&mut self, page: u64, request: &Request, since: Instant) -> Option<String> {
         match request {
-            Request::Edit { edit, gesture } => match self.apply(edit) {
+            Request::Edit { edit, gesture } => match self.apply(edit, since) {
                 Ok(inverse) => {
                     let gesture: Option<Gesture> = gesture.map(|gesture| (page, gesture));
                     self.history.did(history::label(edit, &self.model), inverse, gesture);
@@ -162,7 +184,7 @@ impl Solver {
                 let is_undo = *request == Request::Undo;
                 let next = if is_undo { self.history.next_undo() } else { self.history.next_redo() };
                 let edit = next?.clone();
-                match self.apply(&edit) {
+                match self.apply(&edit, since) {
                     Ok(inverse) if is_undo => self.history.undid(inverse),
                     Ok(inverse) => self.history.redid(inverse),
                     Err(error) => return Some(refusal(format!("Not changed: {error}."))),
@@ -189,9 +211,9 @@ impl Solver {
         }
     }
 
-    fn apply(&mut self, edit: &Edit) -> Result<Edit, EditError> {
+    fn apply(&mut self, edit: &Edit, since: Instant) -> Result<Edit, EditError> {
         let applied = self.session.apply(edit)?;
-        (self.edited, self.is_done) = (Some(Instant::now()), false);
+        (self.edited, self.is_done) = (self.edited.or(Some(since)), false);
         self.edits += 1;
         self.since = (Instant::now(), self.session.status().rays);
         self.post_model();

@@ -7,7 +7,7 @@ use glam::{DAffine3, DMat4, DVec3};
 use radiosity_scene::material::MAX_REFLECTANCE;
 use radiosity_scene::{Scene, Sky, Source};
 use radiosity_transport::live::REACH;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How much larger or smaller than in the file an object may be made, as a factor of its volume.
 const MOST_SCALE: f64 = 1e9;
@@ -22,6 +22,8 @@ pub struct Done {
     pub strands: BTreeSet<usize>,
     /// Strands in whose columns lamps were dimmed.
     pub dimmed: BTreeSet<usize>,
+    /// The groups of copies by those of their originals.
+    pub groups: BTreeMap<u32, u32>,
     pub repaints: bool,
     pub traces: bool,
 }
@@ -163,7 +165,9 @@ impl Session {
                 let original = self.objects[object.0 as usize].clone();
                 let added = self.live.copy(object.0 as usize, affine(matrix));
                 let light = original.light.map(|light| Light { body: Some(added), ..self.lights[light].clone() });
-                let group = self.objects.iter().map(|object| object.group).max().unwrap_or(0) + 1;
+                // Copies of what belongs together, made together, belong together.
+                let new = self.objects.iter().map(|object| object.group).max().unwrap_or(0) + 1;
+                let group = *done.groups.entry(original.group).or_insert(new);
                 self.objects.push(super::Placed { matrix: *matrix, light: None, group, ..original });
                 if let Some(light) = light {
                     done.added_lights.push(self.lights.len());

@@ -79,6 +79,8 @@ pub struct State {
     pub is_summed: bool,
     /// Whether an edit waits for its first picture.
     pub is_edited: bool,
+    /// Whether the light of all lamps together is to be solved again by the rays that there are.
+    needs_total: bool,
     /// Objects that have come since `shown`.
     pub newcomers: Vec<usize>,
     /// Work so far, seconds.
@@ -130,12 +132,12 @@ impl Session {
                 return self.quick(deadline);
             }
             // So early that the next picture is as soon there as one of the edit would be.
-            (self.state.is_edited, self.state.solved_rays) = (false, self.state.solved_rays.min(target.rays - 1));
+            self.state.needs_total = true;
             self.state.before = None;
         }
         if self.live.needs(Part::Far) {
             self.live.work(Part::Far, || Instant::now() < deadline);
-        } else if self.state.solved_rays < target.rays {
+        } else if self.state.solved_rays < target.rays || self.state.needs_total {
             self.solve_total();
         } else if target != most {
             self.live.set_target(self.level(2 * target.rays));
@@ -260,6 +262,7 @@ impl Session {
             let mut h = std::mem::take(&mut total.h);
             self.mask_absent(&mut h);
             self.state.before = None;
+            (self.state.needs_total, self.state.is_edited) = (false, false);
             self.state.newcomers.clear();
             self.show(h);
             self.judge();
