@@ -31,7 +31,7 @@ pub struct MeasureOptions {
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 400, rounds: 5, seed: 1 }
+        MeasureOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 1000, rounds: 5, seed: 1 }
     }
 }
 
