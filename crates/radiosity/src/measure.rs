@@ -152,12 +152,13 @@ pub fn measure(
     let [most, at_one_percent] = LOOKED_UP_CELLS;
     solve.cells = solve.cells.max((at_one_percent * 0.01 / options.error).min(most) as usize);
     solve.variation = solve.variation.min(VARIATION * options.error);
+    solve.looked_up = true;
     solve.suit_method();
     solve.fit(tracer);
     let wanted = rays_for(options.error, 512.0, FEWEST_GATHERED, 16384);
     // Within a time limit one comes to them step by step.
     let mut gather = if monitor.deadline().is_some() { FEWEST_GATHERED } else { wanted };
-    let shadow_rays = rays_for(options.error, 256.0, 32, 8192);
+    let shadow_rays = rays_for(options.error, 512.0, 32, 8192);
     let mut shadowing = Shadowing { places: 1, rays: (shadow_rays * gather / wanted).max(16) as u32 };
     monitor.round(1, options.rounds + 1);
     let mut solution = Solution::new(tracer, &solve, monitor)?;
@@ -229,7 +230,7 @@ pub fn measure(
 fn growth(error: f64) -> usize {
     // Error ∝ M^−0.7, as that of stratified samples is.
     let wanted = (error / AIM).powf(1.0 / 0.7).clamp(2.0, MOST_GROWTH);
-    (wanted as usize).next_power_of_two()
+    (wanted.ceil() as usize).next_power_of_two()
 }
 
 /// Two rounds that leave more than this part of the error before them are the last: what remains is not noise. One

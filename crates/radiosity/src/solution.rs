@@ -22,6 +22,9 @@ use serde::Serialize;
 pub struct SolveOptions {
     /// Width of a cell, metres: of an element, where direct light is even. `None` chooses it by `cells`.
     pub element_size: Option<f64>,
+    /// Whether what comes of it is only looked up, by a gather: triangles much smaller than cells get their share of the
+    /// rays then, as the noise of many averages out.
+    pub looked_up: bool,
     /// How many cells to aim for on top of one per triangle. At ten thousand the walls of a room are cut into cells of
     /// some 15 cm, and their light varies by a few percent from cell to cell.
     pub cells: usize,
@@ -51,6 +54,7 @@ impl Default for SolveOptions {
     fn default() -> Self {
         SolveOptions {
             element_size: None,
+            looked_up: false,
             cells: 10_000,
             variation: 0.05,
             rays: 64,
@@ -217,7 +221,9 @@ impl<'a> Solution<'a> {
         }
         let watch = Watch(monitor);
         let elements = stages.time(monitor, "elements", || {
-            divided(tracer, Elements::new(scene, mesh, element_size), options.variation, &watch)
+            let cells = Elements::new(scene, mesh, element_size);
+            let cells = if options.looked_up { cells.shared(element_size) } else { cells };
+            divided(tracer, cells, options.variation, &watch)
         })?;
         options.refuse_large_matrices(elements.len())?;
         let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);

@@ -19,6 +19,10 @@ const NO_CELL: u32 = u32::MAX;
 /// triangle from taking the whole budget; larger surfaces are rare and smooth.
 const MAX_DIVISION: u32 = 64;
 
+/// Area of the smallest cells of a square, relative to that of a square as wide as they are asked to be: half of it, as
+/// divisions go up by twos.
+const SMALLEST_CELL: f64 = 0.125;
+
 /// The elements of a mesh.
 #[derive(Clone, Debug, Default)]
 pub struct Elements {
@@ -32,6 +36,8 @@ pub struct Elements {
     first: Vec<ElementId>,
     /// Cell of each element.
     cell: Vec<u32>,
+    /// Area from which on a cell counts as a whole one, m²; zero where all do.
+    whole: f64,
 }
 
 impl Elements {
@@ -69,6 +75,19 @@ impl Elements {
         }
         first.push(cell.len() as ElementId);
         Elements { first, cell, ..self.clone() }
+    }
+
+    /// The same elements, where triangles too small to be cut into cells of `size` count by their area: for light that is
+    /// only looked up, so that the noise of many small ones averages out.
+    pub fn shared(self, size: f64) -> Elements {
+        Elements { whole: SMALLEST_CELL * size * size, ..self }
+    }
+
+    /// Share of the rays of a cell that an element gets: all, or as many as the pieces of a divided cell leave it, or what
+    /// its area tells ([`Elements::shared`]).
+    pub fn share(&self, mesh: &Mesh, element: ElementId) -> f64 {
+        let even = 1.0 / f64::from(self.pieces(element));
+        if self.whole > 0.0 { even.min(self.area(mesh, element) / self.whole) } else { even }
     }
 
     /// How many elements a size would give, without making them.

@@ -39,6 +39,7 @@ pub type Bands = [f32; 3];
 pub const LUMINANCE: Bands = [0.2126, 0.7152, 0.0722];
 
 /// The luminance-weighted mean of three bands; of an irradiance in lux per band it is the illuminance in lux.
+#[inline]
 pub fn luminance(bands: Bands) -> f32 {
     LUMINANCE[0] * bands[0] + LUMINANCE[1] * bands[1] + LUMINANCE[2] * bands[2]
 }

@@ -8,7 +8,7 @@
 //! light get its exact factor, and points near a large one, where area sampling goes wrong by factors, are as good
 //! as far ones.
 
-use crate::luminaires::Light;
+use crate::luminaires::{Light, MOST_EXACT_PIECES};
 use crate::one_light::{CHANCE, DARK, LIT, from_few, from_many, from_point, luminance_of, unshadowed, weigh};
 use crate::{Luminaires, Progress, Receivers, Stopped};
 use radiosity_scene::Bands;
@@ -17,10 +17,6 @@ use radiosity_trace::{Place, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// Lights with more triangles than this are sampled by area; evaluating the polygon factor of each would cost more than
-/// the shadow rays.
-const MOST_EXACT_PIECES: usize = 64;
 
 /// Lights of up to this many triangles have them picked by about what they give, larger ones by their power alone.
 const MOST_WEIGHED_PIECES: usize = 4096;
@@ -247,9 +243,9 @@ impl Luminaires {
                 // One sample does not pay for weighing the pieces.
                 from_many((pieces, cumulative), tracer, place, (&sequence, 0, 1), seed).0
             }
-            Light::Area { pieces, .. } => {
+            Light::Area { pieces, fours, .. } => {
                 let mut factors = [0.0; MOST_EXACT_PIECES];
-                let here = unshadowed(pieces, place, &mut factors);
+                let here = unshadowed((pieces, fours), place, &mut factors);
                 from_few((pieces, &factors), here, tracer, place, (&sequence, 0, 1), (RATIO, seed)).0
             }
         }
@@ -323,10 +319,10 @@ impl Luminaires {
                     let square = away.length_squared().max(radius * radius).max(f64::MIN_POSITIVE);
                     ([0.0; 3], if above { power / (4.0 * PI * square) } else { 0.0 })
                 }
-                Light::Area { pieces, .. } => {
+                Light::Area { pieces, fours, .. } => {
                     let first = scratch.factors.len();
                     scratch.factors.resize(first + pieces.len(), 0.0);
-                    let e = unshadowed(pieces, place, &mut scratch.factors[first..]);
+                    let e = unshadowed((pieces, fours), place, &mut scratch.factors[first..]);
                     (e, luminance_of(e))
                 }
             };

@@ -147,9 +147,15 @@ fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32) -> u
     })
 }
 
+/// Cells with a smaller share of the rays are not examined: places in them are rejected one by one.
+const LEAST_SHARE: f64 = 0.125;
+
 /// The masks of the elements of a cell that are not wholly exposed.
 fn examine_cell(tracer: &Tracer, mesh: &Mesh, elements: &Elements, cell: usize) -> Vec<(u32, u64)> {
     let ids = elements.of_cell(cell);
+    if elements.share(mesh, ids.start) * (ids.len() as f64) < LEAST_SHARE {
+        return Vec::new();
+    }
     let whole = Site::new(mesh, elements, ids.start, elements.cell_corners(cell), u64::MAX);
     let sequence = Sequence::new(ids.start, EXPOSURE);
     if !is_suspect(tracer, &whole, &sequence) {

@@ -30,7 +30,7 @@ pub use gather::Gather;
 pub use luminaires::{Light, Luminaires};
 pub use nodes::{NodeMesh, NodeOptions, node_transport};
 pub use pair::{Factor, Occlusion, PAIRS, Pair, PairMethod, Unoccluded};
-pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers};
+pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers, Site};
 pub use regions::{RegionOptions, RegionSize, Regions, regions};
 pub use row::{Row, RowFactors};
 pub use rows::{HitTable, IdSpace};

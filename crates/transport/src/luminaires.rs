@@ -1,6 +1,7 @@
 //! Luminaires: the small and bright sources, whose light goes to every receiver directly ([`crate::direct`]) and never
 //! through rows of rays, which would find them too seldom.
 
+use crate::polygon::Four;
 use glam::DVec3;
 use radiosity_scene::{AlphaMode, Bands, Elements, Mesh, PointLight, Scene, Side, luminance};
 use rayon::prelude::*;
@@ -28,6 +29,10 @@ pub struct Piece {
     pub varied: bool,
 }
 
+/// Lights with more triangles than this are sampled by area; evaluating the polygon factor of each would cost more than
+/// the shadow rays.
+pub(crate) const MOST_EXACT_PIECES: usize = 64;
+
 /// A source of direct light.
 #[derive(Clone, Debug)]
 pub enum Light {
@@ -37,6 +42,8 @@ pub enum Light {
         name: String,
         /// Its triangles.
         pieces: Vec<Piece>,
+        /// The same by fours, where they are few.
+        fours: Vec<Four>,
         /// Running sum of the pieces' shares of the power, ending at 1.
         cumulative: Vec<f64>,
         /// Luminous flux, lm.
@@ -144,6 +151,7 @@ impl Luminaires {
             }
             lights.push(Light::Area {
                 name,
+                fours: if pieces.len() > MOST_EXACT_PIECES { Vec::new() } else { by_fours(&pieces) },
                 pieces,
                 cumulative,
                 power: running,
@@ -160,6 +168,11 @@ impl Luminaires {
     pub fn carries(&self, triangle: usize, side: Side) -> bool {
         self.carried[triangle][side as usize]
     }
+}
+
+fn by_fours(pieces: &[Piece]) -> Vec<Four> {
+    let corners: Vec<[DVec3; 3]> = pieces.iter().map(|piece| piece.corners).collect();
+    corners.chunks(4).map(Four::new).collect()
 }
 
 /// Whether what a triangle gives varies over it.

@@ -3,7 +3,7 @@
 //! Estimators answer the irradiance in lux per band, and what became of their rays as bits.
 
 use crate::luminaires::Piece;
-use crate::polygon::{CosineTriangle, point_to_triangle};
+use crate::polygon::{CosineTriangle, Four};
 use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Bands, PointLight, luminance};
@@ -43,14 +43,16 @@ pub fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, n: u32, sa
 }
 
 /// Unshadowed irradiance of a place from a light of few triangles; `factors` gets the luminance of each one's part.
-pub fn unshadowed(pieces: &[Piece], place: &Place, factors: &mut [f64]) -> [f64; 3] {
+pub fn unshadowed((pieces, fours): (&[Piece], &[Four]), place: &Place, factors: &mut [f64]) -> [f64; 3] {
     let mut sum = [0f64; 3];
-    for (piece, out) in pieces.iter().zip(factors) {
-        *out = 0.0;
-        if piece.triangle != place.triangle {
-            let factor = point_to_triangle(place.point, place.normal, piece.corners);
-            (0..3).for_each(|band| sum[band] += factor * f64::from(piece.exitance[band]));
-            *out = factor * f64::from(luminance(piece.exitance));
+    for ((pieces, four), out) in pieces.chunks(4).zip(fours).zip(factors.chunks_mut(4)) {
+        let seen = four.seen_from(place.point, place.normal);
+        for ((piece, factor), out) in pieces.iter().zip(seen).zip(out) {
+            *out = 0.0;
+            if factor > 0.0 && piece.triangle != place.triangle {
+                (0..3).for_each(|band| sum[band] += factor * f64::from(piece.exitance[band]));
+                *out = factor * f64::from(luminance(piece.exitance));
+            }
         }
     }
     sum

@@ -89,7 +89,7 @@ impl Pilot {
         own.square += light * light;
         let cell = |x: f32| ((x * self.side as f32) as usize).min(self.side - 1);
         let (i, j) = (cell(u), cell(v));
-        self.light[(k * self.side + j) * self.side + i] += light as f32;
+        self.light[(k * self.side + j) * self.side + i] += light.max(0.0) as f32;
     }
 
     /// The mean light over the hemisphere of receiver k, by the two halves of its rays, those of new ones, or both. New ones

@@ -123,7 +123,7 @@ impl Receivers for ElementReceivers<'_> {
 
     /// Elements of a divided cell share its places; two are the least that can average over an element.
     fn places(&self, i: usize, wanted: u32) -> u32 {
-        wanted.div_ceil(self.elements.pieces(i as u32)).max(2)
+        ((f64::from(wanted) * self.elements.share(self.mesh, i as u32)).ceil() as u32).max(2)
     }
 
     fn near(&self, i: usize) -> Option<f64> {

@@ -138,10 +138,9 @@ impl Block {
     }
 }
 
-/// Rays of a row where a whole cell gets `columns`: an element of a divided cell gets its share, and at least one ray
-/// in each half.
-fn width(columns: usize, pieces: usize) -> usize {
-    2 * (columns / 2).div_ceil(pieces)
+/// Rays of a row where a whole cell gets `columns`: an element gets its share, and at least one ray in each half.
+fn width(columns: usize, share: f64) -> usize {
+    2 * (((columns / 2) as f64 * share).ceil() as usize).max(1)
 }
 
 /// The table of hit ids of all elements.
@@ -216,7 +215,7 @@ impl HitTable {
         let mut end = 0;
         for i in 0..n {
             starts.push(end);
-            end += width(more, ids.elements.pieces(i as u32) as usize);
+            end += width(more, ids.elements.share(tracer.mesh, i as u32));
         }
         starts.push(end);
         let mut block = Block { starts, ids: vec![0u32; end] };

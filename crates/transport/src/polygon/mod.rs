@@ -3,6 +3,10 @@
 //! plane. The polygon is first clipped to the receiver's horizon. Exact for an unoccluded receiver; loses digits when
 //! the point lies within 1e-6 of the polygon's plane and inside its outline.
 
+mod four;
+
+pub use four::Four;
+
 use glam::DVec3;
 
 /// Twice the area of a planar polygon, along its normal (Newell's), m².
