@@ -31,7 +31,8 @@ pub struct MeasureOptions {
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 1000, rounds: 5, seed: 1 }
+        let solve = SolveOptions { looked_up: true, rays: 16, ..SolveOptions::default() };
+        MeasureOptions { error: 0.01, solve, audit_points: 1000, rounds: 5, seed: 1 }
     }
 }
 
@@ -44,6 +45,9 @@ const VARIATION: f64 = 5.0;
 
 /// Part of the error asked that a round aims at: its bound has to meet that, too.
 const AIM: f64 = 0.6;
+
+/// Part of the error asked that an answer has for certain when more rays are a better use of time than a closer look.
+const HOPELESS: f64 = 0.8;
 
 /// Most that the rays grow by from one round to the next.
 const MOST_GROWTH: f64 = 8.0;
@@ -152,7 +156,6 @@ pub fn measure(
     let [most, at_one_percent] = LOOKED_UP_CELLS;
     solve.cells = solve.cells.max((at_one_percent * 0.01 / options.error).min(most) as usize);
     solve.variation = solve.variation.min(VARIATION * options.error);
-    solve.looked_up = true;
     solve.suit_method();
     solve.fit(tracer);
     let wanted = rays_for(options.error, 512.0, FEWEST_GATHERED, 16384);
@@ -185,8 +188,9 @@ pub fn measure(
             answer = solution.gathered(&places, gather, &shadowing, monitor)?;
         }
         let watched: Vec<Bands> = watched.iter().map(|&i| answer.irradiance[i]).collect();
-        let audit =
-            certify(&mut auditor, |auditor| auditor.judge(&watched), options.error, most_paths, &stages, monitor)?;
+        let target = (options.error, is_hopeless as fn(&Audit, f64) -> bool);
+        let judge = |auditor: &Auditor| auditor.judge(&watched);
+        let audit = certify_unless(&mut auditor, judge, target, most_paths, &stages, monitor)?;
         rounds.push(Round::new(&solution, gather, &shadowing, &audit, start));
         monitor.note(&rounds[rounds.len() - 1].to_string());
         let achieved = audit.upper <= options.error;
@@ -256,12 +260,30 @@ pub(crate) fn most_paths(error: f64) -> u32 {
 /// says of a few places may be wrong by more than its own scatter tells.
 const SURE: u32 = 1 << 16;
 
+/// Whether an answer is not worth a closer look: it may be within the target, but to know that for certain would take
+/// more paths than better answers take rays.
+fn is_hopeless(audit: &Audit, target: f64) -> bool {
+    audit.lower > HOPELESS * target
+}
+
 /// Has the auditor `judge` an answer, spending the referee's paths until the answer meets the target or misses it for certain:
 /// taking an estimate for the truth would refine for the noise of the referee.
 pub(crate) fn certify(
     auditor: &mut Auditor,
     judge: impl Fn(&Auditor) -> Audit,
     target: f64,
+    most_paths: u32,
+    stages: &Stages,
+    monitor: &dyn Monitor,
+) -> Result<Audit, Error> {
+    certify_unless(auditor, judge, (target, Audit::is_above), most_paths, stages, monitor)
+}
+
+/// The same, until the answer meets the target or is given up.
+fn certify_unless(
+    auditor: &mut Auditor,
+    judge: impl Fn(&Auditor) -> Audit,
+    (target, is_given_up): (f64, fn(&Audit, f64) -> bool),
     most_paths: u32,
     stages: &Stages,
     monitor: &dyn Monitor,
@@ -274,7 +296,7 @@ pub(crate) fn certify(
         let least = SURE.div_ceil(total.max(1) as u32);
         loop {
             let audit = judge(auditor);
-            let unsure = !audit.is_above(target) || auditor.paths() < least;
+            let unsure = !is_given_up(&audit, target) || auditor.paths() < least;
             let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths && !is_over(monitor);
             if !open {
                 return Ok(audit);
