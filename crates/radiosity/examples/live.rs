@@ -7,12 +7,15 @@
 #[path = "../tests/common/room.rs"]
 mod room;
 
-use radiosity::session::{Edit, LightId, ObjectId, Session, SessionOptions};
+use radiosity::session::{Edit, EditError, LightId, ObjectId, Session, SessionOptions};
 use room::{Furnishing, room};
 use std::time::{Duration, Instant};
 
 /// Steps of a viewer: a third of a frame.
 const BUDGET: Duration = Duration::from_millis(5);
+
+/// How often each edit is measured.
+const TIMES: usize = 8;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<usize> = std::env::args().skip(1).filter_map(|x| x.parse().ok()).collect();
@@ -50,36 +53,81 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
 
     let shift = |x: f64, z: f64| glam::DMat4::from_translation(glam::DVec3::new(x, 0.0, z)).to_cols_array();
-    let edits = [
-        ("dimming", Edit::Light { light: LightId(0), dimming: 0.4, colour: [1.0; 3] }),
-        ("reflectance", Edit::Reflectance { object: ObjectId(4), reflectance: [0.2, 0.6, 0.3] }),
-        ("move a chair", Edit::Move { object: ObjectId(chair as u32), matrix: shift(0.3, 0.4) }),
-        ("move it again", Edit::Move { object: ObjectId(chair as u32), matrix: shift(0.5, 0.2) }),
-        ("move a lamp", Edit::Move { object: ObjectId(lamp_object as u32), matrix: shift(0.4, 0.3) }),
-        ("delete a chair", Edit::Delete { object: ObjectId(chair as u32 + 1) }),
-        ("copy a chair", Edit::Copy { object: ObjectId(chair as u32), matrix: shift(1.0, -0.9) }),
-    ];
-    for (name, edit) in edits {
-        let (started, rays) = (Instant::now(), session.status().rays_traced);
-        session.apply(&edit)?;
-        let applied = started.elapsed();
+    let dimmed = |dimming: f32| Edit::Light { light: LightId(0), dimming, colour: [1.0; 3] };
+    let painted = |green: f32| Edit::Reflectance { object: ObjectId(4), reflectance: [0.2, green, 0.3] };
+    let moved = |object: usize, x: f64, z: f64| Edit::Move { object: ObjectId(object as u32), matrix: shift(x, z) };
+    let deleted = Edit::Delete { object: ObjectId(chair as u32 + 1) };
+    let restored = Edit::Restore { object: ObjectId(chair as u32 + 1) };
+    println!("medians; milliseconds by the clock, and of all processors in brackets");
+    measure(&mut session, "dimming", [dimmed(0.4), dimmed(0.9)])?;
+    measure(&mut session, "reflectance", [painted(0.6), painted(0.3)])?;
+    measure(&mut session, "move a chair", [moved(chair, 0.3, 0.4), moved(chair, 0.5, 0.2)])?;
+    measure(&mut session, "move a lamp", [moved(lamp_object, 0.4, 0.3), moved(lamp_object, 0.1, 0.5)])?;
+    measure(&mut session, "delete, restore", [deleted, restored])?;
+    Ok(())
+}
+
+/// Carries out two edits in turn, and prints how long the light took.
+fn measure(session: &mut Session, name: &str, edits: [Edit; 2]) -> Result<(), EditError> {
+    let [mut applied, mut complete, mut done] = [const { Vec::new() }; 3];
+    let rays = session.status().rays_traced;
+    for edit in edits.iter().cycle().take(TIMES) {
+        let clock = Clock::new();
+        session.apply(edit)?;
+        applied.push(clock.read());
         let mut first = None;
         loop {
             let step = session.step(BUDGET);
             if step.is_complete && first.is_none() {
-                first = Some(started.elapsed());
+                first = Some(clock.read());
             }
             if step.is_done {
                 break;
             }
         }
-        println!(
-            "{name:15} applied {:5.1} ms, complete {:6.1} ms, done {:7.1} ms, {} rays",
-            1e3 * applied.as_secs_f64(),
-            1e3 * first.unwrap_or_default().as_secs_f64(),
-            1e3 * started.elapsed().as_secs_f64(),
-            session.status().rays_traced - rays
-        );
+        complete.extend(first);
+        done.push(clock.read());
     }
+    let median = |of: Vec<[f64; 2]>| {
+        let [wall, busy] = [0, 1].map(|k| {
+            let mut sorted: Vec<f64> = of.iter().map(|times| times[k]).collect();
+            sorted.sort_by(f64::total_cmp);
+            sorted[sorted.len() / 2]
+        });
+        format!("{wall:6.1} ({busy:6.1})")
+    };
+    println!(
+        "{name:15} applied {}, complete {}, done {}, {} rays",
+        median(applied),
+        median(complete),
+        median(done),
+        (session.status().rays_traced - rays) / TIMES as u64
+    );
     Ok(())
+}
+
+/// Milliseconds since a moment: by the clock, and of all threads on processors (Linux; elsewhere zero), which other
+/// programs do not lengthen much.
+struct Clock {
+    started: Instant,
+    busy: f64,
+}
+
+impl Clock {
+    fn new() -> Clock {
+        Clock { started: Instant::now(), busy: Clock::busy() }
+    }
+
+    fn busy() -> f64 {
+        let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
+        let of = |thread: std::io::Result<std::fs::DirEntry>| {
+            let text = std::fs::read_to_string(thread.ok()?.path().join("schedstat")).ok()?;
+            text.split(' ').next()?.parse::<f64>().ok()
+        };
+        1e-6 * threads.filter_map(of).sum::<f64>()
+    }
+
+    fn read(&self) -> [f64; 2] {
+        [1e3 * self.started.elapsed().as_secs_f64(), Clock::busy() - self.busy]
+    }
 }

@@ -174,7 +174,6 @@ impl Session {
                     self.add_light(light);
                 }
                 done.added.push(added);
-                self.state.newcomers.push(added);
                 self.touch(added, done);
                 Edit::Delete { object: ObjectId(added as u32) }
             }
@@ -186,7 +185,6 @@ impl Session {
             Edit::Restore { object } => {
                 let index = object.0 as usize;
                 self.live.place(index, affine(&self.objects[index].matrix));
-                self.state.newcomers.push(index);
                 self.touch(index, done);
                 Edit::Delete { object: *object }
             }
@@ -202,6 +200,7 @@ impl Session {
     fn touch(&mut self, index: usize, done: &mut Done) {
         done.objects.insert(index);
         done.traces = true;
+        self.state.movers.push(index);
         if let Some(light) = self.objects[index].light {
             done.strands.insert(self.lights[light].strand);
         }

@@ -39,6 +39,17 @@ impl Answer {
             .fold(0.0, f64::max);
     }
 
+    /// Y = R H.
+    pub fn reflect<const W: usize>(&self, h: &[Lanes<W>], y: &mut [Lanes<W>]) {
+        let lanes = y.par_iter_mut().zip(h).zip(&self.rho).with_min_len(4096);
+        lanes.for_each(|((y, h), rho)| {
+            for k in 0..W / 3 * 3 {
+                y.0[k] = rho[k % 3] * h.0[k];
+            }
+        });
+        self.pass(h, y);
+    }
+
     /// Y = E + R H.
     pub fn respond<const W: usize>(&self, e: &[Lanes<W>], h: &[Lanes<W>], y: &mut [Lanes<W>]) {
         let lanes = y.par_iter_mut().zip(e).zip(h).zip(&self.rho).with_min_len(4096);
@@ -47,6 +58,11 @@ impl Answer {
                 y.0[k] = e.0[k] + rho[k % 3] * h.0[k];
             }
         });
+        self.pass(h, y);
+    }
+
+    /// Adds what passes through sheets.
+    fn pass<const W: usize>(&self, h: &[Lanes<W>], y: &mut [Lanes<W>]) {
         for (id, other, tau) in &self.passed {
             let h = h[*other as usize].0;
             for k in 0..W / 3 * 3 {
@@ -55,6 +71,34 @@ impl Answer {
         }
     }
 }
+
+/// By what a last step of several is to be multiplied, band by band, so that all those that would follow are in it: steps
+/// of a geometric series, whose quotient is ⟨s, s°⟩/⟨s°, s°⟩ with s° the step before (Lyusternik 1947). Weighted by area.
+pub fn tail(answer: &Answer, before: &[Lanes<4>], step: &[Lanes<4>]) -> [f32; 3] {
+    let sums: Vec<[[f64; 2]; 3]> = before
+        .par_chunks(SUM)
+        .zip(step.par_chunks(SUM))
+        .zip(answer.area.par_chunks(SUM))
+        .map(|((before, step), area)| {
+            let mut sums = [[0f64; 2]; 3];
+            for ((before, step), area) in before.iter().zip(step).zip(area) {
+                for (band, sum) in sums.iter_mut().enumerate() {
+                    sum[0] += f64::from(area * step.0[band] * before.0[band]);
+                    sum[1] += f64::from(area * before.0[band] * before.0[band]);
+                }
+            }
+            sums
+        })
+        .collect();
+    std::array::from_fn(|band| {
+        let [product, square] = sums.iter().fold([0.0; 2], |sum, own| [sum[0] + own[band][0], sum[1] + own[band][1]]);
+        let quotient = if square > 0.0 { (product / square).clamp(0.0, MOST_QUOTIENT) } else { 0.0 };
+        (1.0 / (1.0 - quotient)) as f32
+    })
+}
+
+/// No room that is built gives back more of its light; noise must not make more of it.
+const MOST_QUOTIENT: f64 = 0.8;
 
 /// Elements that are summed together; sums of them are added in their order.
 const SUM: usize = 1024;

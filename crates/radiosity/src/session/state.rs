@@ -5,12 +5,14 @@
 //! a fresh session has, and dimming only adds it up anew.
 //!
 //! After an edit there is something to see before that: with F the first rays of each row as they were and F' as they are
-//! now, H' = H + (D' − D) + (F' Y' − F Y), Y' = E' + R' H'. The noise of the rows that stay cancels in the difference, so
-//! that a few rays will do (a delta solve: George, Sillion and Greenberg 1990 shoot the same difference).
+//! now, H' = C + D' + F' Y', Y' = E' + R' H', where C = H − D − F Y is what the other rays brought besides. The noise of the
+//! rows that stay cancels in the difference, so that a few rays will do (a delta solve: George, Sillion and Greenberg 1990
+//! shoot the same difference). C does not change while edits follow one another, except that it is nothing on what moves.
+//! The first sweep takes all of Y', those after it only by how much it still changes, with fewer rays each as that is less.
 
 use super::Session;
 use super::light::{Light, Strand, lamps};
-use super::solve::Solve;
+use super::solve::{Solve, tail};
 use radiosity_scene::{Bands, luminance};
 use radiosity_transport::live::{Lanes, NEAR_RAYS, Part, Target};
 use rayon::prelude::*;
@@ -20,9 +22,12 @@ use std::time::Instant;
 /// Rays per element of the first picture.
 const FIRST_RAYS: u32 = 4;
 
-/// Sweeps from an edit to the first picture. What an edit changes is reflected some four times before less than a
-/// tenth of it is left; the exact light follows.
-const QUICK_SWEEPS: u32 = 4;
+/// Sweeps from an edit to the first picture; the last one stands for those that would follow as well ([`tail`]). Two would
+/// not tell how fast they fall off; the exact light follows.
+const QUICK_SWEEPS: u32 = 3;
+
+/// Each sweep takes half as many rays as the one before it: it moves about half as much light.
+const LEAST_QUICK_RAYS: usize = 4;
 
 /// Residual of pictures while rays are still traced, whose noise is far above it.
 const ROUGH_TOLERANCE: f64 = 1e-3;
@@ -30,18 +35,16 @@ const ROUGH_TOLERANCE: f64 = 1e-3;
 /// Residual of columns.
 const TOLERANCE: f64 = 1e-4;
 
-/// Light before an edit.
-struct Before {
-    h: Vec<Lanes<4>>,
-    d: Vec<Lanes<4>>,
-    gathered: Vec<Lanes<4>>,
-}
-
 /// The first picture after an edit, on its way.
 struct Quick {
-    y: Vec<Lanes<4>>,
     e: Vec<Lanes<4>>,
     d: Vec<Lanes<4>>,
+    h: Vec<Lanes<4>>,
+    /// What goes through the rows next: all of Y', then by how much that changes.
+    y: Vec<Lanes<4>>,
+    /// By how much H has changed at the last sweep, and room for the next.
+    step: Vec<Lanes<4>>,
+    gathered: Vec<Lanes<4>>,
     sweeps: u32,
 }
 
@@ -81,11 +84,12 @@ pub struct State {
     pub is_edited: bool,
     /// Whether the light of all lamps together is to be solved again by the rays that there are.
     needs_total: bool,
-    /// Objects that have come since `shown`.
-    pub newcomers: Vec<usize>,
+    /// Objects that have come or moved: what was kept of their light is not theirs any more.
+    pub movers: Vec<usize>,
     /// Work so far, seconds.
     pub seconds: f64,
-    before: Option<Before>,
+    /// What rays beyond the first brought to what is shown, by id; none if it is not known.
+    rest: Option<Vec<Lanes<4>>>,
     quick: Option<Quick>,
     total: Option<Solve<4>>,
     block: Option<(Vec<usize>, Block)>,
@@ -115,14 +119,15 @@ impl State {
 impl Session {
     /// Whether nothing is left to do.
     pub(super) fn is_done(&self) -> bool {
-        self.state.has_columns && self.state.is_summed
+        self.state.has_columns && self.state.is_summed && self.state.rest.is_some()
     }
 
     /// One piece of work: as many rays as there is time for, or a sweep.
     pub(super) fn piece(&mut self, deadline: Instant) {
         let (target, most) = (self.live.target(), self.live.most());
         if self.state.has_columns {
-            return self.sum_columns();
+            // The second so that the next edit need not do it.
+            return if self.state.is_summed { self.find_rest() } else { self.sum_columns() };
         }
         if target.rays == 0 {
             return self.live.set_target(self.level(FIRST_RAYS));
@@ -133,7 +138,7 @@ impl Session {
             }
             // So early that the next picture is as soon there as one of the edit would be.
             self.state.needs_total = true;
-            self.state.before = None;
+            self.state.rest = None;
         }
         if self.live.needs(Part::Far) {
             self.live.work(Part::Far, || Instant::now() < deadline);
@@ -154,30 +159,39 @@ impl Session {
         Target { rays, shadows }
     }
 
+    /// What rays beyond the first brought to what is shown: H − D − F Y, with the first rays of each row as they were when it
+    /// was found.
+    fn find_rest(&mut self) {
+        let (ids, near) = (self.live.ids(), self.live.target().near().rays as usize);
+        let state = &mut self.state;
+        for list in [&mut state.shown, &mut state.direct, &mut state.given] {
+            list.resize(ids, Lanes::default());
+        }
+        let mut rest = vec![Lanes::default(); ids];
+        self.live.gather(&state.given, near, &mut rest);
+        rest.par_iter_mut().zip(&state.shown).zip(&state.direct).with_min_len(4096).for_each(|((rest, h), d)| {
+            *rest = Lanes(std::array::from_fn(|k| h.0[k] - d.0[k] - rest.0[k]));
+        });
+        state.rest = Some(rest);
+    }
+
     /// The first picture after an edit.
     fn quick(&mut self, deadline: Instant) {
-        let near = self.live.target().near().rays as usize;
+        if self.state.rest.is_none() {
+            // Rows are still those of what is shown: nothing is traced before this.
+            self.find_rest();
+        }
         let ids = self.live.ids();
         let state = &mut self.state;
-        if state.before.is_none() {
-            // Rows are still those of what is shown: nothing is traced before this.
-            for list in [&mut state.shown, &mut state.direct, &mut state.given] {
-                list.resize(ids, Lanes::default());
-            }
-            let mut gathered = vec![Lanes::default(); ids];
-            self.live.gather(&state.given, near, &mut gathered);
-            state.before = Some(Before { h: state.shown.clone(), d: state.direct.clone(), gathered });
+        for list in [&mut state.shown, &mut state.direct, &mut state.given] {
+            list.resize(ids, Lanes::default());
         }
-        if let Some(before) = &mut state.before {
-            state.given.resize(ids, Lanes::default());
-            for list in [&mut before.h, &mut before.d, &mut before.gathered] {
-                list.resize(ids, Lanes::default());
-                for body in &state.newcomers {
-                    let body = &self.live.world().bodies[*body];
-                    list[body.first as usize..=body.dark() as usize].fill(Lanes::default());
-                }
+        if let Some(rest) = &mut state.rest {
+            rest.resize(ids, Lanes::default());
+            for body in state.movers.drain(..) {
+                let body = &self.live.world().bodies[body];
+                rest[body.first as usize..=body.dark() as usize].fill(Lanes::default());
             }
-            state.newcomers.clear();
         }
         if self.live.needs(Part::Near) {
             self.live.work(Part::Near, || Instant::now() < deadline);
@@ -187,41 +201,53 @@ impl Session {
             Some(quick) => quick,
             None => self.begin_quick(),
         };
-        let Some(before) = &self.state.before else { return };
-        let mut h = vec![Lanes::default(); ids];
-        self.live.gather(&quick.y, near, &mut h);
-        let others = h.par_iter_mut().zip(&before.h).zip(&quick.d).zip(&before.d).zip(&before.gathered);
-        others.with_min_len(4096).for_each(|((((h, old), d), old_d), old_gathered)| {
+        let rays = (self.live.target().near().rays as usize >> quick.sweeps).max(LEAST_QUICK_RAYS);
+        self.live.gather(&quick.y, rays, &mut quick.gathered);
+        let is_first = quick.sweeps == 0;
+        quick.sweeps += 1;
+        let is_last = quick.sweeps == QUICK_SWEEPS;
+        // By how much the light changes now.
+        match &self.state.rest {
+            Some(rest) if is_first => {
+                let all = quick.gathered.par_iter_mut().zip(&quick.h).zip(&quick.d).zip(rest);
+                all.with_min_len(4096).for_each(|(((gathered, h), d), rest)| {
+                    (0..3).for_each(|k| gathered.0[k] = rest.0[k] + d.0[k] + gathered.0[k] - h.0[k]);
+                });
+            }
+            _ => {}
+        }
+        std::mem::swap(&mut quick.step, &mut quick.gathered);
+        let factor = if is_last { tail(&self.answer, &quick.gathered, &quick.step) } else { [1.0; 3] };
+        quick.h.par_iter_mut().zip(&mut quick.step).with_min_len(4096).for_each(|(h, step)| {
             for k in 0..3 {
-                h.0[k] = (old.0[k] + (d.0[k] - old_d.0[k]) + (h.0[k] - old_gathered.0[k])).max(0.0);
+                let now = (h.0[k] + factor[k] * step.0[k]).max(0.0);
+                step.0[k] = now - std::mem::replace(&mut h.0[k], now);
             }
         });
-        self.mask_absent(&mut h);
-        let mut y = vec![Lanes::default(); ids];
-        self.answer.respond(&quick.e, &h, &mut y);
-        quick.sweeps += 1;
-        if quick.sweeps < QUICK_SWEEPS {
-            quick.y = y;
+        if !is_last {
+            self.answer.reflect(&quick.step, &mut quick.y);
             self.state.quick = Some(quick);
             return;
         }
-        self.state.before = None;
+        self.mask_absent(&mut quick.h);
+        let mut given = quick.y;
+        self.answer.respond(&quick.e, &quick.h, &mut given);
         self.state.is_edited = false;
-        (self.state.direct, self.state.given) = (quick.d, y);
-        self.show(h);
+        (self.state.direct, self.state.given) = (quick.d, given);
+        self.show(quick.h);
     }
 
     fn begin_quick(&self) -> Quick {
         let (e, d) = (self.emission(), self.direct_light());
-        let mut h = vec![Lanes::default(); self.live.ids()];
-        if let Some(before) = &self.state.before {
-            for (((h, old), d), old_d) in h.iter_mut().zip(&before.h).zip(&d).zip(&before.d) {
-                *h = Lanes(std::array::from_fn(|k| (old.0[k] + (d.0[k] - old_d.0[k])).max(0.0)));
-            }
-        }
-        let mut y = vec![Lanes::default(); self.live.ids()];
+        let nothing = || vec![Lanes::default(); self.live.ids()];
+        let (mut h, mut y) = (nothing(), nothing());
+        let lights = h.par_iter_mut().zip(&self.state.shown).zip(&d).zip(&self.state.direct);
+        lights.with_min_len(4096).for_each(|(((h, old), d), old_d)| {
+            *h = Lanes(std::array::from_fn(|k| (old.0[k] + (d.0[k] - old_d.0[k])).max(0.0)));
+        });
+        self.mask_absent(&mut h);
         self.answer.respond(&e, &h, &mut y);
-        Quick { y, e, d, sweeps: 0 }
+        Quick { y, h, e, d, step: nothing(), gathered: nothing(), sweeps: 0 }
     }
 
     /// Sets light to nothing that is of no element that is there.
@@ -261,9 +287,9 @@ impl Session {
             self.state.given = total.radiosity().to_vec();
             let mut h = std::mem::take(&mut total.h);
             self.mask_absent(&mut h);
-            self.state.before = None;
+            self.state.rest = None;
             (self.state.needs_total, self.state.is_edited) = (false, false);
-            self.state.newcomers.clear();
+            self.state.movers.clear();
             self.show(h);
             self.judge();
         } else {
@@ -369,8 +395,8 @@ impl Session {
         (self.state.direct, self.state.given) = (self.direct_light(), y);
         self.state.is_summed = true;
         self.state.is_edited = false;
-        self.state.before = None;
-        self.state.newcomers.clear();
+        self.state.rest = None;
+        self.state.movers.clear();
         self.state.solved_rays = self.live.target().rays;
         self.show(h);
         if is_first {

@@ -1,15 +1,15 @@
 //! Some elements of one object with all their rays: what each met, how far away, and which of them an edit dirties.
 //!
 //! An entry of a row is an id and the distance of the hit. After an object has changed, three kinds of entries are dirty:
-//! those that met it, which are traced anew; those that pass through the box where it is now, which are traced against it
-//! alone; and its own, all of them. The rays to look at are found by cones of directions ([`Strata`]), so that an edit
-//! costs a few rays per element and not all. Shadow rays likewise: stopped ones that pass through the box where the object
+//! those that met it, which their ids tell and which are traced anew; those that pass through the box where it is now, which
+//! are traced against it alone; and its own, all of them. The second are found by cones of directions ([`Strata`]), so that an
+//! edit costs a few rays per element and not all. Shadow rays likewise: stopped ones that pass through the box where the object
 //! was may have come free, free ones that pass through the box where it is may be stopped.
 
 use super::body::{Body, Bounds, Site};
 use super::column::Column;
 use super::strata::{Cells, Strata};
-use super::world::World;
+use super::world::{Met, World};
 use glam::DVec3;
 use radiosity_scene::Bands;
 use radiosity_scene::elements::triangle_from_square;
@@ -116,6 +116,8 @@ pub struct Chunk {
     scale: [Vec<f32>; 2],
     /// One over the part of each element that is exposed; zero where next to nothing is.
     open: Vec<f32>,
+    /// Entries of each row that met black backs.
+    dark: Vec<u16>,
     shadows: Vec<Shadows>,
     /// Changes that have been looked at, for the first part and the rest.
     seen: [usize; 2],
@@ -129,6 +131,8 @@ pub struct Work<'a> {
     pub columns: &'a [Column],
     /// Changes.
     pub changes: &'a [Change],
+    /// What is dirty for chunks that have seen so many of them; others work it out.
+    pub dirt: Vec<(usize, Dirt<'a>)>,
     /// Cells for rows of as many rays as there are, and of the first part of them.
     pub strata: &'a [Strata; 2],
     /// How many rays there shall be.
@@ -144,36 +148,107 @@ struct Dirty<'a> {
     now: Option<Bounds>,
 }
 
-struct Dirt<'a> {
+/// What chunks that have seen as many changes have to look at.
+pub struct Dirt<'a> {
     bodies: Vec<Dirty<'a>>,
     before: Vec<Bounds>,
     now: Vec<Bounds>,
+    /// Balls around where they were and are, and around where they are.
     balls: Vec<(DVec3, f64)>,
+    balls_now: Vec<(DVec3, f64)>,
+    /// Lowest of their ids, and how much higher the highest is.
+    ids: (u32, u32),
 }
 
 impl<'a> Dirt<'a> {
-    fn new(world: &'a World, changes: &[Change]) -> Dirt<'a> {
-        let mut dirt = Dirt { bodies: Vec::new(), before: Vec::new(), now: Vec::new(), balls: Vec::new() };
+    /// Of some changes. Only the first of each object counts: rays that have not seen it are of the world before it, and
+    /// where the object is now it tells itself.
+    pub fn new(world: &'a World, changes: &[Change]) -> Dirt<'a> {
+        let mut dirt = Dirt {
+            bodies: Vec::new(),
+            before: Vec::new(),
+            now: Vec::new(),
+            balls: Vec::new(),
+            balls_now: Vec::new(),
+            ids: (0, 0),
+        };
         for change in changes {
-            if let Some(bounds) = change.before
-                && !dirt.before.contains(&bounds)
-            {
-                dirt.before.push(bounds);
-            }
             if dirt.bodies.iter().all(|other| other.body != change.body) {
                 let own = &world.bodies[change.body];
                 let now = own.is_present.then_some(own.bounds);
+                dirt.before.extend(change.before);
                 dirt.now.extend(now);
                 dirt.bodies.push(Dirty { body: change.body, own, now });
             }
         }
         let margin = 4.0 * world.offset;
-        for bounds in dirt.before.iter().chain(&dirt.now) {
+        let ball = |bounds: &Bounds| {
             let (centre, radius) = bounds.ball();
-            dirt.balls.push((centre, radius + margin));
-        }
+            (centre, radius + margin)
+        };
+        dirt.balls = dirt.before.iter().chain(&dirt.now).map(ball).collect();
+        dirt.balls_now = dirt.now.iter().map(ball).collect();
+        let low = dirt.bodies.iter().map(|dirty| dirty.own.first).min().unwrap_or(0);
+        let high = dirt.bodies.iter().map(|dirty| dirty.own.dark()).max().unwrap_or(0);
+        dirt.ids = (low, high - low);
         dirt
     }
+
+    /// The directions from a place in which what has changed may be now.
+    fn cones(&self, site: &Site) -> SmallVec<[Cone; 4]> {
+        let mut cones = SmallVec::new();
+        for (centre, radius) in &self.balls_now {
+            let along = *centre - site.centre;
+            let reach = radius + site.radius;
+            if along.dot(site.normal) <= -reach {
+                continue;
+            }
+            let distance = along.length();
+            if distance <= 1.001 * reach {
+                cones.clear();
+                cones.push(Cone { axis: site.normal, angle: None, nearest: 0.0 });
+                break;
+            }
+            let sine = reach / distance;
+            let angle = Some(((1.0 - sine * sine).sqrt(), sine));
+            cones.push(Cone { axis: along / distance, angle, nearest: distance - reach });
+        }
+        cones
+    }
+}
+
+/// Directions to a ball.
+struct Cone {
+    axis: DVec3,
+    /// Cosine and sine of half its angle; none for all directions.
+    angle: Option<(f64, f64)>,
+    /// Nearer than this nothing of the ball is met.
+    nearest: f64,
+}
+
+impl Cone {
+    #[inline]
+    fn has(&self, direction: DVec3) -> bool {
+        self.angle.is_none_or(|(cosine, _)| self.axis.dot(direction) >= cosine - ROUNDING)
+    }
+}
+
+/// Words of a bit for each ray of a row, at most.
+const MOST_WORDS: usize = 16;
+
+/// The numbers of the bits that are set.
+fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let bit = bits.trailing_zeros();
+        bits &= bits.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
+}
+
+/// What is kept of a hit.
+#[inline]
+fn entry(world: &World, met: Option<Met>, direction: DVec3) -> (f32, u32) {
+    (met.map_or(f32::INFINITY, |met| met.key), world.id(met, direction))
 }
 
 impl Chunk {
@@ -195,6 +270,7 @@ impl Chunk {
             keys: vec![0.0; n * stride as usize],
             scale: [vec![0.0; n], vec![0.0; n]],
             open: vec![0.0; n],
+            dark: vec![0; n],
             shadows: Vec::new(),
             seen: [0; 2],
         };
@@ -217,6 +293,7 @@ impl Chunk {
         rays as usize * (size_of::<u32>() + size_of::<f32>())
             + columns * (size_of::<u64>() + size_of::<Bands>())
             + 3 * size_of::<f32>()
+            + size_of::<u16>()
             + size_of::<Site>()
     }
 
@@ -231,9 +308,12 @@ impl Chunk {
         self.shadows.resize(columns, empty);
     }
 
-    /// Forgets all rays: the object is elsewhere.
-    pub fn forget(&mut self, world: &World) {
+    /// Forgets all rays: the object is elsewhere. There is nothing left that changes before the one of number `changes`
+    /// could have dirtied.
+    pub fn forget(&mut self, world: &World, changes: usize) {
         self.traced = 0;
+        self.dark.fill(0);
+        self.seen = [changes; 2];
         self.find_sites(world);
         (0..self.shadows.len()).for_each(|column| self.forget_column(column));
     }
@@ -262,9 +342,14 @@ impl Chunk {
         }
     }
 
-    /// Takes no notice of changes up to a number: there are none any more.
-    pub fn reset_seen(&mut self) {
-        self.seen = [0; 2];
+    /// How many changes have been looked at, for the first part and the rest.
+    pub fn seen(&self) -> [usize; 2] {
+        self.seen
+    }
+
+    /// Changes have other numbers now.
+    pub fn renumber(&mut self, number: impl Fn(usize) -> usize) {
+        self.seen = self.seen.map(number);
     }
 
     /// Rays of each row so far.
@@ -289,21 +374,28 @@ impl Chunk {
             rays += self.work(work, Part::Near);
         }
         let target = work.target.of(part);
-        let changes = &work.changes[self.seen[part as usize].min(work.changes.len())..];
         // What was traced before the changes, of this part.
         let known = match part {
             Part::Near => 0..self.traced.min(target.rays),
             Part::Far => NEAR_RAYS.min(self.traced)..self.traced,
         };
-        let dirt = Dirt::new(work.world, changes);
-        if !dirt.bodies.is_empty() {
+        let seen = self.seen[part as usize];
+        if seen < work.changes.len() {
+            let own;
+            let dirt = match work.dirt.iter().find(|(of, _)| *of == seen) {
+                Some((_, dirt)) => dirt,
+                None => {
+                    own = Dirt::new(work.world, &work.changes[seen..]);
+                    &own
+                }
+            };
             if !known.is_empty() {
                 for e in 0..self.len {
-                    rays += self.mend_row(work, part, &dirt, e, known.clone());
+                    rays += self.mend_row(work, part, dirt, e, known.clone());
                 }
             }
             for column in 0..self.shadows.len() {
-                rays += self.mend_shadows(work, part, &dirt, column);
+                rays += self.mend_shadows(work, part, dirt, column);
             }
         }
         self.seen[part as usize] = work.changes.len();
@@ -314,7 +406,7 @@ impl Chunk {
         if self.traced < target.rays {
             rays += u64::from(target.rays - self.traced) * self.len as u64;
             for e in 0..self.len {
-                self.trace_row(work.world, e, self.traced..target.rays);
+                self.trace_row(work, e, self.traced..target.rays);
             }
             self.traced = target.rays;
             (0..self.len).for_each(|e| self.weigh(work, e));
@@ -331,22 +423,22 @@ impl Chunk {
         (self.sites[e], hash(world.bodies[self.body].key ^ hash(self.first + e as u32)))
     }
 
-    fn trace_row(&mut self, world: &World, e: usize, range: std::ops::Range<u32>) {
+    fn trace_row(&mut self, work: &Work, e: usize, range: std::ops::Range<u32>) {
+        let world = work.world;
         let (site, seed) = self.site(world, e);
         let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
         for m in range {
             let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
-            let met = world.first(&ray, salt);
             let at = self.at(e, m);
-            self.ids[at] = world.id(met, direction);
-            self.keys[at] = met.map_or(f32::INFINITY, |met| met.key);
+            (self.keys[at], self.ids[at]) = entry(world, world.first(&ray, salt), direction);
+            self.dark[e] += u16::from(work.is_dark[self.ids[at] as usize]);
         }
     }
 
     /// Works out what rays of a row count, after some were traced.
     fn weigh(&mut self, work: &Work, e: usize) {
         let (rays, near) = (self.traced as usize, self.traced.min(NEAR_RAYS) as usize);
-        if self.parts(e, rays).into_iter().flatten().all(|id| !work.is_dark[*id as usize]) {
+        if self.dark[e] == 0 {
             self.scale[0][e] = 1.0 / near as f32;
             self.scale[1][e] = 1.0 / rays as f32;
             self.open[e] = 1.0;
@@ -362,57 +454,61 @@ impl Chunk {
         }
     }
 
-    /// Traces the entries of a row that changes have dirtied.
+    /// Sets an entry; answers whether it met a black back and does not any more, or the other way round.
+    fn set(&mut self, work: &Work, e: usize, at: usize, (key, id): (f32, u32)) -> bool {
+        let [was, is] = [self.ids[at], id].map(|id| work.is_dark[id as usize]);
+        (self.keys[at], self.ids[at]) = (key, id);
+        self.dark[e] = self.dark[e] + u16::from(is) - u16::from(was);
+        was != is
+    }
+
+    /// Traces the entries of a row that changes have dirtied; `known` are those of the part that have been traced.
     fn mend_row(&mut self, work: &Work, part: Part, dirt: &Dirt, e: usize, known: std::ops::Range<u32>) -> u64 {
-        let world = work.world;
-        let (site, seed) = self.site(world, e);
-        let frame = frame(site.normal);
-        let strata = &work.strata[part as usize];
-        let mut cells = Cells::default();
-        // Directions and cosines of the cones about the balls.
-        let mut cones: SmallVec<[(DVec3, f64); 4]> = SmallVec::new();
-        for (centre, radius) in &dirt.balls {
-            let along = *centre - site.centre;
-            let reach = radius + site.radius;
-            if along.dot(site.normal) <= -reach {
-                continue;
-            }
-            let distance = along.length();
-            if distance <= 1.001 * reach {
-                cells = Cells::ALL;
-                cones.push((site.normal, -2.0));
-                break;
-            }
-            let sine = reach / distance;
-            let cosine = (1.0 - sine * sine).sqrt();
-            let direction = DVec3::from_array(frame.map(|axis| axis.dot(along) / distance));
-            strata.towards(direction, (cosine, sine), &mut cells);
-            cones.push((along / distance, cosine - ROUNDING));
-        }
-        if cells.is_empty() {
+        let lost = self.find_lost(dirt, e, &known);
+        let cones = dirt.cones(&self.sites[e]);
+        if lost == [0; MOST_WORDS] && cones.is_empty() {
             return 0;
         }
-        let sequence = Sequence::new(seed, ROWS);
-        let margin = 4.0 * world.offset;
+        let world = work.world;
+        let (site, seed) = self.site(world, e);
+        let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
         let (mut rays, mut has_changed) = (0, false);
-        strata.rays(&cells, &sequence, |m| {
-            if !known.contains(&m) {
-                return;
+        for (word, bits) in lost.into_iter().enumerate() {
+            for bit in ones(bits) {
+                rays += 1;
+                let m = known.start + 64 * word as u32 + bit;
+                let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
+                has_changed |= self.set(work, e, self.at(e, m), entry(world, world.first(&ray, salt), direction));
             }
-            let [u, v] = sequence.pair(m);
-            let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-            if cones.iter().all(|(axis, cosine)| axis.dot(direction) < *cosine) {
-                return;
+        }
+        if !cones.is_empty() {
+            let mut cells = Cells::default();
+            for cone in &cones {
+                match cone.angle {
+                    Some(angle) => {
+                        let direction = DVec3::from_array(frame.map(|axis| axis.dot(cone.axis)));
+                        work.strata[part as usize].towards(direction, angle, &mut cells);
+                    }
+                    None => cells = Cells::ALL,
+                }
             }
-            let at = self.at(e, m);
-            let (id, key) = (self.ids[at], self.keys[at]);
-            let mut is_lost = dirt.bodies.iter().any(|dirty| dirty.own.has(id));
-            if !is_lost && dirt.now.is_empty() {
-                return;
-            }
-            let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
-            let mut best: Option<(f32, u32)> = None;
-            if !is_lost {
+            let nearest = cones.iter().map(|cone| cone.nearest).fold(f64::INFINITY, f64::min);
+            let margin = 4.0 * world.offset;
+            work.strata[part as usize].rays(&cells, &sequence, |m| {
+                let Some(place) = m.checked_sub(known.start).filter(|_| m < known.end) else { return };
+                let at = self.at(e, m);
+                let key = self.keys[at];
+                let is_traced = lost[place as usize / 64] >> (place % 64) & 1 == 1;
+                if is_traced || f64::from(key) + margin < nearest {
+                    return;
+                }
+                let [u, v] = sequence.pair(m);
+                let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+                if !cones.iter().any(|cone| cone.has(direction)) {
+                    return;
+                }
+                let (ray, salt) = shoot_to(world, &site, (&sequence, seed), direction, m);
+                let mut best: Option<(f32, u32)> = None;
                 let (origin, along) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
                 for dirty in &dirt.bodies {
                     let Some(bounds) = dirty.now else { continue };
@@ -423,27 +519,41 @@ impl Chunk {
                     rays += 1;
                     let Some(met) = world.first_of(dirty.body, &ray, salt, limit) else { continue };
                     if met.key < limit {
-                        best = Some((met.key, world.id(Some(met), direction)));
+                        best = Some(entry(world, Some(met), direction));
                     } else {
                         // At the same distance the number of the triangle decides, which is not kept.
-                        is_lost = true;
+                        rays += 1;
+                        best = Some(entry(world, world.first(&ray, salt), direction));
+                        break;
                     }
                 }
-            }
-            if is_lost {
-                rays += 1;
-                let met = world.first(&ray, salt);
-                best = Some((met.map_or(f32::INFINITY, |met| met.key), world.id(met, direction)));
-            }
-            if let Some((key, id)) = best {
-                has_changed |= self.ids[at] != id;
-                (self.keys[at], self.ids[at]) = (key, id);
-            }
-        });
+                if let Some(best) = best {
+                    has_changed |= self.set(work, e, at, best);
+                }
+            });
+        }
         if has_changed {
             self.weigh(work, e);
         }
         rays
+    }
+
+    /// Which entries of a row met objects that have changed, a bit for each of those that are `known`.
+    fn find_lost(&self, dirt: &Dirt, e: usize, known: &std::ops::Range<u32>) -> [u64; MOST_WORDS] {
+        let mut lost = [0; MOST_WORDS];
+        let from = self.at(e, known.start);
+        let row = &self.ids[from..from + known.len()];
+        let (low, width) = dirt.ids;
+        for (word, ids) in lost.iter_mut().zip(row.chunks(64)) {
+            // All at once, as nearly no row has any.
+            if !ids.iter().fold(false, |any, id| any | (id.wrapping_sub(low) <= width)) {
+                continue;
+            }
+            for (bit, id) in ids.iter().enumerate() {
+                *word |= u64::from(dirt.bodies.iter().any(|dirty| dirty.own.has(*id))) << bit;
+            }
+        }
+        lost
     }
 
     /// Traces the shadow rays to a column that changes have dirtied.
@@ -510,16 +620,21 @@ impl Chunk {
             let (site, seed) = self.site(world, e);
             let sequence = light.sequence(seed);
             let mut clear = self.shadows[column].clear[e];
+            let mut sum = [0f64; 3];
             for index in from..target {
                 if let Some(sample) = light.sample(world, &site, (seed, &sequence), index) {
                     rays += 1;
                     if !world.blocked(&sample.ray, sample.salt) {
                         clear |= 1 << index;
+                        (0..3).for_each(|band| sum[band] += sample.light[band]);
                     }
                 }
             }
             self.shadows[column].clear[e] = clear;
-            self.shadows[column].light[e] = bring(work, column, (&site, seed), target, clear);
+            // The same sum by `bring` would draw all samples once more.
+            let is_first = from == 0;
+            self.shadows[column].light[e] =
+                if is_first { mean(sum, target) } else { bring(work, column, (&site, seed), target, clear) };
             self.shadows[column].is_rough[e] = false;
         }
         rays
@@ -541,11 +656,13 @@ impl Chunk {
         self.shadows[column].light[e].map(|x| x * self.open[e])
     }
 
-    /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs.
+    /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs. Of fewer than there are in the
+    /// first part as many are taken to count as in all of it.
     #[inline]
     pub fn row(&self, e: usize, rays: usize) -> ([&[u32]; 2], f32) {
-        let part = usize::from(rays > NEAR_RAYS as usize);
-        (self.parts(e, rays), self.scale[part][e])
+        let (part, near) = (usize::from(rays > NEAR_RAYS as usize), self.traced.min(NEAR_RAYS) as usize);
+        let share = self.scale[part][e];
+        (self.parts(e, rays), if rays < near { share * (near as f32 / rays as f32) } else { share })
     }
 
     #[inline]
@@ -586,7 +703,20 @@ fn shoot(
 ) -> (Ray, DVec3, u32) {
     let [u, v, x, y] = sequence.point(m);
     let direction = cosine_direction(frame, f64::from(u), f64::from(v));
-    (world.ray(&site.place(x, y), direction, f64::INFINITY), direction, hash(hash(seed) ^ m))
+    (world.ray(&site.place(x, y), direction, f64::INFINITY), direction, salt_of(seed, m))
+}
+
+/// Ray m of a row, whose direction is known.
+#[inline]
+fn shoot_to(world: &World, site: &Site, (sequence, seed): (&Sequence, u32), direction: DVec3, m: u32) -> (Ray, u32) {
+    let [_, _, x, y] = sequence.point(m);
+    (world.ray(&site.place(x, y), direction, f64::INFINITY), salt_of(seed, m))
+}
+
+/// Decides whether blended surfaces stop ray m.
+#[inline]
+fn salt_of(seed: u32, m: u32) -> u32 {
+    hash(hash(seed) ^ m)
 }
 
 /// What the first `n` shadow rays bring, given which are clear.
@@ -599,6 +729,10 @@ fn bring(work: &Work, column: usize, (site, seed): (&Site, u32), n: u32, clear: 
             (0..3).for_each(|band| sum[band] += sample.light[band]);
         }
     }
+    mean(sum, n)
+}
+
+fn mean(sum: [f64; 3], n: u32) -> Bands {
     sum.map(|s| (s / f64::from(n.max(1))) as f32)
 }
 

@@ -42,11 +42,12 @@ pub use column::{Column, Lamp};
 pub use gather::Lanes;
 pub use world::{REACH, World};
 
-use chunk::{CHUNK, Change, Work};
+use chunk::{CHUNK, Change, Dirt, Work};
 use glam::DAffine3;
 use radiosity_scene::elements::division_of;
 use radiosity_scene::{Bands, Scene};
 use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use strata::Strata;
@@ -54,12 +55,20 @@ use strata::Strata;
 /// How long the chunks that are handed out together shall take: as often it is asked whether to go on.
 const PIECE: Duration = Duration::from_millis(5);
 
+/// Changes that may gather in any case.
+const LEAST_ROOM: usize = 64;
+
+/// What is dirty is worked out for all chunks together that have seen as many changes, for so many numbers of them.
+const MOST_SHARED: usize = 8;
+
 /// Objects, rows and columns of light.
 pub struct Live {
     world: World,
     columns: Vec<Column>,
     chunks: Vec<Chunk>,
     changes: Vec<Change>,
+    /// So many changes may gather before those that nobody needs are looked for.
+    room: usize,
     strata: [Strata; 2],
     target: Target,
     most: Target,
@@ -81,6 +90,7 @@ impl Live {
             columns: Vec::new(),
             chunks: Vec::new(),
             changes: Vec::new(),
+            room: LEAST_ROOM,
             strata: [most.near(), most].map(|target| Strata::new(target.rays)),
             target: Target { rays: 0, shadows: 0 },
             most,
@@ -147,14 +157,42 @@ impl Live {
     }
 
     fn forget(&mut self, body: usize) {
-        let world = &self.world;
-        self.chunks.iter_mut().filter(|chunk| chunk.body == body).for_each(|chunk| chunk.forget(world));
+        let (world, changes) = (&self.world, self.changes.len());
+        self.chunks.iter_mut().filter(|chunk| chunk.body == body).for_each(|chunk| chunk.forget(world, changes));
+    }
+
+    /// Notes that an object changes.
+    fn note(&mut self, body: usize, before: Option<Bounds>) {
+        if self.changes.len() >= self.room {
+            self.drop_changes();
+            self.room = (2 * self.changes.len()).max(LEAST_ROOM);
+        }
+        self.changes.push(Change { body, before });
+    }
+
+    /// Drops changes that no chunk needs: of each object a chunk looks at the first that it has not seen. So they stay few
+    /// while an object is dragged about, however long.
+    fn drop_changes(&mut self) {
+        let seen: BTreeSet<usize> = self.chunks.iter().flat_map(Chunk::seen).collect();
+        // How many are kept before each.
+        let (mut kept, mut number) = (Vec::new(), Vec::with_capacity(self.changes.len() + 1));
+        let mut next = BTreeMap::new();
+        for (k, change) in self.changes.drain(..).enumerate() {
+            number.push(kept.len());
+            let from = next.insert(change.body, k + 1).unwrap_or(0);
+            if seen.range(from..=k).next().is_some() {
+                kept.push(change);
+            }
+        }
+        number.push(kept.len());
+        self.changes = kept;
+        self.chunks.iter_mut().for_each(|chunk| chunk.renumber(|seen| number[seen]));
     }
 
     /// Puts an object elsewhere, or brings it back.
     pub fn place(&mut self, body: usize, matrix: DAffine3) {
         let own = &self.world.bodies[body];
-        self.changes.push(Change { body, before: own.is_present.then_some(own.bounds) });
+        self.note(body, own.is_present.then_some(own.bounds));
         self.world.place(body, matrix);
         self.forget(body);
     }
@@ -162,7 +200,7 @@ impl Live {
     /// Takes an object away.
     pub fn remove(&mut self, body: usize) {
         let own = &self.world.bodies[body];
-        self.changes.push(Change { body, before: own.is_present.then_some(own.bounds) });
+        self.note(body, own.is_present.then_some(own.bounds));
         self.world.remove(body);
         self.forget(body);
     }
@@ -172,8 +210,9 @@ impl Live {
         let shape = self.world.bodies[body].shape.clone();
         let added = self.world.add(shape, matrix);
         self.world.place(added, matrix);
-        self.changes.push(Change { body: added, before: None });
+        self.note(added, None);
         self.cut(added);
+        self.forget(added);
         added
     }
 
@@ -210,6 +249,7 @@ impl Live {
             world: &self.world,
             columns: &self.columns,
             changes: &self.changes,
+            dirt: Vec::new(),
             strata: &self.strata,
             target: self.target,
             is_dark: &self.is_dark,
@@ -227,7 +267,10 @@ impl Live {
     /// whether all is done. The part [`Part::Far`] is all of it, [`Part::Near`] the first rays of each row.
     pub fn work(&mut self, part: Part, mut go_on: impl FnMut() -> bool) -> bool {
         let mut batch = self.batch.max(2 * rayon::current_num_threads());
-        let (chunks, work) = self.split();
+        let (chunks, mut work) = self.split();
+        let seen: BTreeSet<usize> = chunks.iter().flat_map(|chunk| chunk.seen()).collect();
+        let dirty = seen.into_iter().filter(|seen| *seen < work.changes.len()).take(MOST_SHARED);
+        work.dirt = dirty.map(|seen| (seen, Dirt::new(work.world, &work.changes[seen..]))).collect();
         let mut open = chunks.into_iter().filter(|chunk| chunk.needs(&work, part));
         let mut rays = 0;
         let is_done = loop {
@@ -251,11 +294,92 @@ impl Live {
         (self.batch, self.rays_traced) = (batch, self.rays_traced + rays);
         if is_done && part == Part::Far {
             self.changes.clear();
-            self.chunks.iter_mut().for_each(Chunk::reset_seen);
+            self.chunks.iter_mut().for_each(|chunk| chunk.renumber(|_| 0));
             if self.world.is_scattered() {
                 self.world.gather_trees();
             }
         }
         is_done
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    /// A room with a box in it.
+    fn furnished() -> Arc<Scene> {
+        let mut scene = Scene::default();
+        scene.materials.push(radiosity_scene::Material { emissive: [1.0; 3], ..Default::default() });
+        for (name, low, high, is_room) in [("room", 0.0, 4.0, true), ("box", 1.6, 2.4, false), ("lamp", 3.0, 3.2, false)] {
+            let at = |x: f64, y: f64, z: f64| DVec3::splat(low) + (high - low) * DVec3::new(x, y, z);
+            let mut triangles = Vec::new();
+            for axis in 0..3 {
+                for side in [0.0, 1.0] {
+                    let mut quad = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[u, v]| {
+                        let mut p = [side; 3];
+                        (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (u, v);
+                        at(p[0], p[1], p[2])
+                    });
+                    if (side > 0.5) == is_room {
+                        quad.reverse();
+                    }
+                    let [a, b, c, d] = quad;
+                    triangles.extend([[a, b, c], [a, c, d]]);
+                }
+            }
+            scene.add_triangles(name, 0, &triangles);
+        }
+        Arc::new(scene)
+    }
+
+    fn all(live: &Live) -> (Vec<u32>, Vec<u32>) {
+        let of = |chunk: &Chunk, e: usize| {
+            let (row, share) = chunk.row(e, live.target.rays as usize);
+            let light = chunk.light(0, e).map(f32::to_bits);
+            (row.concat(), [share.to_bits(), light[0], light[1], light[2]])
+        };
+        let each = live.chunks.iter().flat_map(|chunk| (0..chunk.len).map(move |e| of(chunk, e)));
+        let (rows, light): (Vec<_>, Vec<_>) = each.unzip();
+        (rows.concat(), light.concat())
+    }
+
+    /// An object is dragged about while rows are still being traced: of its ways little is remembered, and in the end all
+    /// rays are those of a fresh start.
+    #[test]
+    fn a_long_drag_is_forgotten() {
+        let target = Target { rays: 128, shadows: 16 };
+        let fresh = || {
+            let mut live = Live::new(furnished(), 0.7, target);
+            live.add_column(1, &[Lamp::Body(2)]);
+            live.set_target(target);
+            live
+        };
+        let shift = |k: u32| {
+            let turn = f64::from(k) * 0.37;
+            DAffine3::from_translation(DVec3::new(turn.cos(), 0.3 * turn.sin(), (0.7 * turn).sin()))
+        };
+        let mut live = fresh();
+        live.work(Part::Far, || true);
+        for k in 0..600 {
+            live.place(1, shift(k));
+            if k % 5 == 0 {
+                live.place(0, DAffine3::from_translation(DVec3::new(0.01 * shift(k).translation.x, 0.0, 0.0)));
+            }
+            // Sometimes the first part is done, sometimes some of all.
+            let mut pieces = k % 7;
+            live.work(if k % 3 == 0 { Part::Far } else { Part::Near }, || {
+                pieces = pieces.saturating_sub(1);
+                pieces > 0
+            });
+            assert!(live.changes.len() <= 256, "{}", live.changes.len());
+        }
+        live.work(Part::Far, || true);
+        let mut other = fresh();
+        other.place(1, shift(599));
+        other.place(0, DAffine3::from_translation(DVec3::new(0.01 * shift(595).translation.x, 0.0, 0.0)));
+        other.work(Part::Far, || true);
+        assert!(all(&live) == all(&other));
     }
 }
