@@ -193,6 +193,11 @@ fn geometry(from: &Place, to: &Place) -> f64 {
 pub fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
     let [a, b, c] = piece.corners;
     let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
+    // Half of all places look away or lie behind; their solid angles need not be found first.
+    let is_above = |p: &DVec3| (*p - place.point).dot(place.normal) > 0.0;
+    if (place.point - a).dot(piece.normal) <= 0.0 || !piece.corners.iter().any(is_above) {
+        return (seen(a), 0.0);
+    }
     // Far away the solid angle is too small for its own arithmetic, and area sampling is as good.
     let distance = (a + b + c) / 3.0 - place.point;
     if piece.area < 1e-3 * distance.length_squared() {

@@ -189,7 +189,7 @@ impl Session {
             cache: Mutex::new(None),
         };
         lights.into_iter().for_each(|light| session.add_light(light));
-        session.refresh_answer();
+        session.refresh_answer(0..session.objects.len());
         Ok(session)
     }
 
@@ -210,25 +210,34 @@ impl Session {
         }
     }
 
-    /// Reflectances and areas of all ids.
-    fn refresh_answer(&mut self) {
+    /// Reflectances and areas of some objects.
+    fn refresh_answer(&mut self, objects: impl Iterator<Item = usize>) {
         let ids = self.live.ids();
-        self.answer.rho = vec![[0.0; 3]; ids];
-        self.answer.area = vec![0.0; ids];
-        self.answer.passed.clear();
-        for (body, placed) in self.live.world().bodies.iter().zip(&self.objects) {
+        self.answer.rho.resize(ids, [0.0; 3]);
+        self.answer.area.resize(ids, 0.0);
+        for index in objects {
+            let (body, placed) = (&self.live.world().bodies[index], &self.objects[index]);
+            let (first, last) = (body.first as usize, body.dark() as usize);
+            self.answer.rho[first..=last].fill([0.0; 3]);
+            self.answer.area[first..=last].fill(0.0);
+            // By id, so that the same scene has the same list.
+            let passed = &mut self.answer.passed;
+            let [from, to] = [first, last].map(|id| passed.partition_point(|side| (side.0 as usize) < id));
+            passed.drain(from..to);
             if !body.is_present {
                 continue;
             }
+            let mut added = Vec::new();
             for element in 0..body.elements() {
                 let id = body.first + element;
                 let (rho, tau) = placed.paint.of(element, body.shape.fronts, placed.coat);
                 self.answer.rho[id as usize] = rho;
                 self.answer.area[id as usize] = body.area(element) as f32;
                 if let Some(other) = body.shape.opposite(element).filter(|_| placed.paint.transmits) {
-                    self.answer.passed.push((id, body.first + other, tau));
+                    added.push((id, body.first + other, tau));
                 }
             }
+            passed.splice(from..from, added);
         }
         self.answer.measure();
     }
@@ -247,7 +256,7 @@ impl Session {
         let mut done = Done::default();
         let inverse = self.carry_out(edit, &mut done);
         if done.repaints || done.traces {
-            self.refresh_answer();
+            self.refresh_answer(done.objects.iter().copied());
         }
         for strand in &done.strands {
             self.place_lamps(*strand);
@@ -275,8 +284,10 @@ impl Session {
         let started = Instant::now();
         let deadline = started + budget;
         while !self.is_done() {
+            let was_edited = self.state.is_edited;
             self.piece(deadline);
-            if Instant::now() >= deadline {
+            // The light of an edit is wanted at once.
+            if was_edited && !self.state.is_edited || Instant::now() >= deadline {
                 break;
             }
         }

@@ -496,15 +496,15 @@ impl Chunk {
             let margin = 4.0 * world.offset;
             work.strata[part as usize].rays(&cells, &sequence, |m| {
                 let Some(place) = m.checked_sub(known.start).filter(|_| m < known.end) else { return };
-                let at = self.at(e, m);
-                let key = self.keys[at];
                 let is_traced = lost[place as usize / 64] >> (place % 64) & 1 == 1;
-                if is_traced || f64::from(key) + margin < nearest {
-                    return;
-                }
                 let [u, v] = sequence.pair(m);
                 let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-                if !cones.iter().any(|cone| cone.has(direction)) {
+                if is_traced || !cones.iter().any(|cone| cone.has(direction)) {
+                    return;
+                }
+                let at = self.at(e, m);
+                let key = self.keys[at];
+                if f64::from(key) + margin < nearest {
                     return;
                 }
                 let (ray, salt) = shoot_to(world, &site, (&sequence, seed), direction, m);
@@ -658,14 +658,14 @@ impl Chunk {
 
     /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs. Of fewer than there are in the
     /// first part as many are taken to count as in all of it.
-    #[inline]
+    #[inline(always)]
     pub fn row(&self, e: usize, rays: usize) -> ([&[u32]; 2], f32) {
         let (part, near) = (usize::from(rays > NEAR_RAYS as usize), self.traced.min(NEAR_RAYS) as usize);
         let share = self.scale[part][e];
         (self.parts(e, rays), if rays < near { share * (near as f32 / rays as f32) } else { share })
     }
 
-    #[inline]
+    #[inline(always)]
     fn parts(&self, e: usize, rays: usize) -> [&[u32]; 2] {
         let [near, far] = self.room;
         let first = rays.min(near);
