@@ -27,17 +27,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options =
         SessionOptions { elements: argument(0, 60_000), rays: argument(1, 256) as u32, ..SessionOptions::default() };
 
-    let started = Instant::now();
+    println!("milliseconds by the clock, and of all processors in brackets");
+    let started = Clock::new();
     let mut session = Session::new(scene, &options)?;
-    println!("ready: {:.0} ms, {} elements", 1e3 * started.elapsed().as_secs_f64(), session.status().elements);
+    println!("{:10} {}, {} elements", "ready", text(started.read()), session.status().elements);
     let mut last = 0;
     loop {
         let step = session.step(BUDGET);
         let status = session.status();
         if status.rays != last {
             last = status.rays;
-            let seconds = started.elapsed().as_secs_f64();
-            println!("{last:5} rays: {:7.0} ms, error {:.1} %", 1e3 * seconds, 100.0 * status.error);
+            println!("{last:5} rays {}, error {:.1} %", text(started.read()), 100.0 * status.error);
         }
         if step.is_done {
             break;
@@ -45,8 +45,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let status = session.status();
     println!(
-        "done: {:.2} s, {:.1} million rays, error {:.2} %, {} MB",
-        started.elapsed().as_secs_f64(),
+        "{:10} {}, {:.1} million rays, error {:.2} %, {} MB",
+        "done",
+        text(started.read()),
         status.rays_traced as f64 * 1e-6,
         100.0 * status.error,
         status.memory >> 20
@@ -58,7 +59,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let moved = |object: usize, x: f64, z: f64| Edit::Move { object: ObjectId(object as u32), matrix: shift(x, z) };
     let deleted = Edit::Delete { object: ObjectId(chair as u32 + 1) };
     let restored = Edit::Restore { object: ObjectId(chair as u32 + 1) };
-    println!("medians; milliseconds by the clock, and of all processors in brackets");
+    println!("medians of {TIMES}:");
     measure(&mut session, "dimming", [dimmed(0.4), dimmed(0.9)])?;
     measure(&mut session, "reflectance", [painted(0.6), painted(0.3)])?;
     measure(&mut session, "move a chair", [moved(chair, 0.3, 0.4), moved(chair, 0.5, 0.2)])?;
@@ -94,7 +95,7 @@ fn measure(session: &mut Session, name: &str, edits: [Edit; 2]) -> Result<(), Ed
             sorted.sort_by(f64::total_cmp);
             sorted[sorted.len() / 2]
         });
-        format!("{wall:6.1} ({busy:6.1})")
+        text([wall, busy])
     };
     println!(
         "{name:15} applied {}, complete {}, done {}, {} rays",
@@ -104,6 +105,10 @@ fn measure(session: &mut Session, name: &str, edits: [Edit; 2]) -> Result<(), Ed
         (session.status().rays_traced - rays) / TIMES as u64
     );
     Ok(())
+}
+
+fn text([wall, busy]: [f64; 2]) -> String {
+    format!("{wall:7.1} ({busy:7.1})")
 }
 
 /// Milliseconds since a moment: by the clock, and of all threads on processors (Linux; elsewhere zero), which other

@@ -335,8 +335,10 @@ fn element_size(scene: &Scene, options: &SessionOptions) -> f64 {
     let mut size = (2.0 * area / wanted as f64).sqrt().max(f64::MIN_POSITIVE);
     // Elements along an edge are powers of two, so that their number moves in leaps; at the size that is twelve times as
     // wide next to all triangles are one.
-    for _ in 0..14 {
-        if Live::count(scene, size) <= wanted {
+    const STEPS: usize = 14;
+    let least = Live::count(scene, f64::INFINITY);
+    for _ in 0..STEPS {
+        if least <= wanted && Live::count(scene, size) <= wanted {
             break;
         }
         size *= 1.19;

@@ -108,10 +108,11 @@ pub struct Chunk {
     ball: (DVec3, f64),
     /// Rays of each row so far.
     traced: u32,
-    /// Room for the first part of each row, and for the rest. First parts lie together, as they are often read alone.
+    /// Room for the first part of each row, and for the rest. First parts lie together, as they are often read alone; there
+    /// is nothing of the rest before it is traced, as much memory takes its time to come.
     room: [usize; 2],
-    ids: Vec<u32>,
-    keys: Vec<f32>,
+    ids: [Vec<u32>; 2],
+    keys: [Vec<f32>; 2],
     /// One over the rays that count, of the first part and of all, by element.
     scale: [Vec<f32>; 2],
     /// One over the part of each element that is exposed; zero where next to nothing is.
@@ -266,8 +267,8 @@ impl Chunk {
             ball: (DVec3::ZERO, 0.0),
             traced: 0,
             room,
-            ids: vec![0; n * stride as usize],
-            keys: vec![0.0; n * stride as usize],
+            ids: [vec![0; n * near as usize], Vec::new()],
+            keys: [vec![0.0; n * near as usize], Vec::new()],
             scale: [vec![0.0; n], vec![0.0; n]],
             open: vec![0.0; n],
             dark: vec![0; n],
@@ -405,6 +406,10 @@ impl Chunk {
         }
         if self.traced < target.rays {
             rays += u64::from(target.rays - self.traced) * self.len as u64;
+            if target.rays > NEAR_RAYS {
+                self.ids[1].resize(self.len * self.room[1], 0);
+                self.keys[1].resize(self.len * self.room[1], 0.0);
+            }
             for e in 0..self.len {
                 self.trace_row(work, e, self.traced..target.rays);
             }
@@ -429,9 +434,10 @@ impl Chunk {
         let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
         for m in range {
             let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
-            let at = self.at(e, m);
-            (self.keys[at], self.ids[at]) = entry(world, world.first(&ray, salt), direction);
-            self.dark[e] += u16::from(work.is_dark[self.ids[at] as usize]);
+            let (part, at) = self.at(e, m);
+            let (key, id) = entry(world, world.first(&ray, salt), direction);
+            (self.keys[part][at], self.ids[part][at]) = (key, id);
+            self.dark[e] += u16::from(work.is_dark[id as usize]);
         }
     }
 
@@ -455,9 +461,9 @@ impl Chunk {
     }
 
     /// Sets an entry; answers whether it met a black back and does not any more, or the other way round.
-    fn set(&mut self, work: &Work, e: usize, at: usize, (key, id): (f32, u32)) -> bool {
-        let [was, is] = [self.ids[at], id].map(|id| work.is_dark[id as usize]);
-        (self.keys[at], self.ids[at]) = (key, id);
+    fn set(&mut self, work: &Work, e: usize, (part, at): (usize, usize), (key, id): (f32, u32)) -> bool {
+        let [was, is] = [self.ids[part][at], id].map(|id| work.is_dark[id as usize]);
+        (self.keys[part][at], self.ids[part][at]) = (key, id);
         self.dark[e] = self.dark[e] + u16::from(is) - u16::from(was);
         was != is
     }
@@ -503,7 +509,7 @@ impl Chunk {
                     return;
                 }
                 let at = self.at(e, m);
-                let key = self.keys[at];
+                let key = self.keys[at.0][at.1];
                 if f64::from(key) + margin < nearest {
                     return;
                 }
@@ -541,8 +547,8 @@ impl Chunk {
     /// Which entries of a row met objects that have changed, a bit for each of those that are `known`.
     fn find_lost(&self, dirt: &Dirt, e: usize, known: &std::ops::Range<u32>) -> [u64; MOST_WORDS] {
         let mut lost = [0; MOST_WORDS];
-        let from = self.at(e, known.start);
-        let row = &self.ids[from..from + known.len()];
+        let (part, from) = self.at(e, known.start);
+        let row = &self.ids[part][from..from + known.len()];
         let (low, width) = dirt.ids;
         for (word, ids) in lost.iter_mut().zip(row.chunks(64)) {
             // All at once, as nearly no row has any.
@@ -669,14 +675,20 @@ impl Chunk {
     fn parts(&self, e: usize, rays: usize) -> [&[u32]; 2] {
         let [near, far] = self.room;
         let first = rays.min(near);
-        [&self.ids[e * near..][..first], &self.ids[self.len * near + e * far..][..rays - first]]
+        let rest: &[u32] = if rays > first { &self.ids[1][e * far..][..rays - first] } else { &[] };
+        [&self.ids[0][e * near..][..first], rest]
     }
 
-    /// Where entry m of a row is kept.
+    fn key(&self, e: usize, m: u32) -> f32 {
+        let (part, at) = self.at(e, m);
+        self.keys[part][at]
+    }
+
+    /// Where entry m of a row is kept: in which part, and where in it.
     #[inline]
-    fn at(&self, e: usize, m: u32) -> usize {
+    fn at(&self, e: usize, m: u32) -> (usize, usize) {
         let ([near, far], m) = (self.room, m as usize);
-        if m < near { e * near + m } else { self.len * near + e * far + m - near }
+        if m < near { (0, e * near + m) } else { (1, e * far + m - near) }
     }
 
     /// The rays of a row: origin and end about the middle of the scene, `far` where they escape.
@@ -685,7 +697,7 @@ impl Chunk {
         let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
         let ray = |m: u32| {
             let (ray, direction, _) = shoot(world, &site, (&sequence, seed), &frame, m);
-            let (origin, key) = (ray.origin.as_dvec3(), self.keys[self.at(e, m)]);
+            let (origin, key) = (ray.origin.as_dvec3(), self.key(e, m));
             [origin, origin + direction * if key.is_finite() { f64::from(key) } else { far }]
         };
         (0..self.traced).map(ray).collect()

@@ -97,7 +97,7 @@ impl Live {
             rays_traced: 0,
             batch: 1,
         };
-        (0..live.world.bodies.len()).for_each(|body| live.cut(body));
+        live.cut(0..live.world.bodies.len());
         live
     }
 
@@ -145,15 +145,18 @@ impl Live {
         self.most
     }
 
-    /// Cuts an object into chunks.
-    fn cut(&mut self, body: usize) {
-        let n = self.world.bodies[body].elements();
-        for first in (0..n).step_by(CHUNK as usize) {
-            let len = CHUNK.min(n - first);
-            self.chunks.push(Chunk::new(&self.world, body, first, len, self.most.rays, self.columns.len()));
+    /// Cuts objects into chunks.
+    fn cut(&mut self, bodies: std::ops::Range<usize>) {
+        let mut parts = Vec::new();
+        for body in bodies {
+            let n = self.world.bodies[body].elements();
+            parts.extend((0..n).step_by(CHUNK as usize).map(|first| (body, first, CHUNK.min(n - first))));
+            self.is_dark.extend(std::iter::repeat_n(false, n as usize));
+            self.is_dark.push(true);
         }
-        self.is_dark.extend(std::iter::repeat_n(false, n as usize));
-        self.is_dark.push(true);
+        let (world, rays, columns) = (&self.world, self.most.rays, self.columns.len());
+        let made = parts.into_par_iter().map(|(body, first, len)| Chunk::new(world, body, first, len, rays, columns));
+        self.chunks.extend(made.collect::<Vec<_>>());
     }
 
     fn forget(&mut self, body: usize) {
@@ -211,7 +214,7 @@ impl Live {
         let added = self.world.add(shape, matrix);
         self.world.place(added, matrix);
         self.note(added, None);
-        self.cut(added);
+        self.cut(added..added + 1);
         self.forget(added);
         added
     }
