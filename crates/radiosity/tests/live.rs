@@ -3,8 +3,11 @@
 #[path = "common/room.rs"]
 mod room;
 
-use radiosity::session::{Applied, Edit, EditError, Layer, LightId, ObjectId, Session, SessionOptions};
-use radiosity::{Bands, Mesh, Scene, Side, Solution, SolveOptions, Tracer, cornell_box, luminance};
+use radiosity::session::{
+    Applied, Edit, EditError, Layer, LightId, LightKind, MOST_EDITS, NewLight, NewLightKind, ObjectId, Session,
+    SessionOptions,
+};
+use radiosity::{Bands, Material, Mesh, Scene, Side, Solution, SolveOptions, Surface, Texture, TextureRef, Tracer, cornell_box, luminance};
 use radiosity_trace::sampling::Random;
 use room::{Furnishing, room};
 use std::time::Duration;
@@ -64,11 +67,22 @@ impl Dice {
         (glam::DMat4::from_translation(shift) * turn).to_cols_array()
     }
 
+    fn light(&mut self, reach: f64) -> NewLight {
+        let kind = match self.below(3) {
+            0 => NewLightKind::Point,
+            1 => NewLightKind::Spot { inner: 0.2, outer: 0.7 },
+            _ => NewLightKind::Directional,
+        };
+        let at = [(); 3].map(|()| self.between(0.0, reach));
+        let direction = [self.between(-1.0, 1.0), -1.0, self.between(-1.0, 1.0)];
+        NewLight { name: "added".to_owned(), kind, position: at, direction, intensity: [50.0, 40.0, 30.0] }
+    }
+
     fn edit(&mut self, session: &Session, reach: f64) -> Edit {
         let model = session.model();
         let object = ObjectId(self.below(model.objects.len()) as u32);
         let light = LightId(self.below(model.lights.len()) as u32);
-        match self.below(9) {
+        match self.below(12) {
             0 | 1 => Edit::Light {
                 light,
                 dimming: if self.below(4) == 0 { 0.0 } else { self.between(0.0, 2.0) as f32 },
@@ -78,6 +92,12 @@ impl Dice {
             3..=5 => Edit::Move { object, matrix: self.matrix(reach) },
             6 => Edit::MoveLight { light, matrix: self.matrix(reach) },
             7 => Edit::Copy { object, matrix: self.matrix(reach) },
+            8 => Edit::AddLight { light: self.light(reach) },
+            9 => Edit::CopyLight { light, matrix: self.matrix(reach) },
+            10 => match model.lights.iter().find(|light| light.deleted && light.object.is_none()) {
+                Some(deleted) if self.below(2) == 0 => Edit::RestoreLight { light: deleted.id },
+                _ => Edit::DeleteLight { light },
+            },
             _ => match model.objects.iter().find(|object| object.deleted) {
                 Some(deleted) if self.below(2) == 0 => Edit::Restore { object: deleted.id },
                 _ => Edit::Delete { object },
@@ -195,6 +215,140 @@ fn undo_restores_every_bit() {
     }
     finish(&mut session);
     assert!(bits(&session)[..before.len()] == before[..]);
+}
+
+/// The first picture after an edit is near the light that follows: by less than a tenth of what the edit changes.
+#[test]
+fn the_first_picture_is_near_the_last() {
+    let shift = glam::DMat4::from_translation(glam::DVec3::new(0.5, 0.0, 0.4)).to_cols_array();
+    let options = SessionOptions { elements: 4000, rays: 256, ..SessionOptions::default() };
+    let scene = room(&Furnishing { tables: 1, lamps: 2, books: 6 });
+    let named = |name: &str| ObjectId(scene.objects.iter().position(|object| object.name == name).unwrap() as u32);
+    let edits = [
+        Edit::Reflectance { object: named("wall west"), reflectance: [0.9, 0.9, 0.9] },
+        Edit::Reflectance { object: named("floor"), reflectance: [0.05, 0.1, 0.8] },
+        Edit::Move { object: named("lamp 0"), matrix: shift },
+    ];
+    let mut session = Session::new(scene.clone(), &options).unwrap();
+    finish(&mut session);
+    let all = |session: &Session| -> Vec<(Bands, f64)> {
+        let objects = (0..session.model().objects.len() as u32).map(ObjectId);
+        objects.flat_map(|id| session.irradiance(id).into_iter().zip(session.exposed_areas(id))).collect()
+    };
+    let distance = |a: &[(Bands, f64)], b: &[(Bands, f64)]| {
+        let square = |(a, b): (&(Bands, f64), &(Bands, f64))| {
+            b.1 * (0..3).map(|band| f64::from(a.0[band] - b.0[band]).powi(2)).sum::<f64>()
+        };
+        a.iter().zip(b).map(square).sum::<f64>().sqrt()
+    };
+    for edit in edits {
+        let before = all(&session);
+        session.apply(&edit).unwrap();
+        while !session.step(Duration::ZERO).is_complete {}
+        let first = all(&session);
+        finish(&mut session);
+        let last = all(&session);
+        let (off, change) = (distance(&first, &last), distance(&before, &last));
+        println!("{edit:?}: {:.3}", off / change);
+        assert!(off < 0.1 * change, "{edit:?}: {off} of {change}");
+    }
+}
+
+/// Lights without area come and go like objects; one that is gone gives nothing and traces nothing.
+#[test]
+fn lights_without_area_come_and_go() {
+    let mut session = Session::new(cornell_box(), &small()).unwrap();
+    finish(&mut session);
+    let before = bits(&session);
+    let light = |session: &Session, id: LightId| session.model().lights[id.0 as usize].clone();
+    let spot = NewLight {
+        name: "spot".to_owned(),
+        kind: NewLightKind::Spot { inner: 0.3, outer: 0.6 },
+        position: [0.25, 0.4, 0.25],
+        direction: [0.0, -3.0, 0.0],
+        intensity: [5.0; 3],
+    };
+    let added = session.apply(&Edit::AddLight { light: spot.clone() }).unwrap();
+    let id = added.added_lights[0];
+    assert_eq!(added.inverse, Edit::DeleteLight { light: id });
+    assert_eq!((light(&session, id).kind, light(&session, id).direction), (LightKind::Spot, Some([0.0, -1.0, 0.0])));
+    finish(&mut session);
+    let lit = bits(&session);
+    assert!(lit != before);
+    assert_eq!(session.edited_scene().lights.len(), 1);
+
+    let rays = session.status().rays_traced;
+    let deleted = session.apply(&added.inverse).unwrap();
+    finish(&mut session);
+    assert!(light(&session, id).deleted && session.edited_scene().lights.is_empty());
+    assert!(bits(&session) == before && session.status().rays_traced == rays);
+    assert_eq!(session.apply(&added.inverse), Err(EditError::DeletedLight(id)));
+    session.apply(&deleted.inverse).unwrap();
+    finish(&mut session);
+    assert!(bits(&session) == lit && session.status().rays_traced == rays);
+    assert_eq!(session.apply(&deleted.inverse), Err(EditError::LightNotDeleted(id)));
+
+    let place = glam::DMat4::from_translation(glam::DVec3::new(0.1, 0.0, 0.0)).to_cols_array();
+    let copy = session.apply(&Edit::CopyLight { light: id, matrix: place }).unwrap();
+    let at = light(&session, copy.added_lights[0]).position.unwrap();
+    assert!((at[0] - 0.35).abs() < 1e-12 && at[1] == 0.4);
+    session.apply(&copy.inverse).unwrap();
+    finish(&mut session);
+    assert!(bits(&session) == lit);
+
+    let mut refused = |change: &dyn Fn(&mut NewLight)| {
+        let mut light = spot.clone();
+        change(&mut light);
+        assert!(matches!(session.apply(&Edit::AddLight { light }), Err(EditError::NewLight(_))));
+    };
+    refused(&|light| light.position[1] = f64::NAN);
+    refused(&|light| light.position[1] = 1e6);
+    refused(&|light| light.direction[0] = f64::INFINITY);
+    refused(&|light| light.intensity[2] = -1.0);
+    refused(&|light| light.intensity[2] = 1e10);
+    refused(&|light| light.kind = NewLightKind::Spot { inner: 0.7, outer: 0.6 });
+    refused(&|light| light.kind = NewLightKind::Spot { inner: 0.0, outer: 2.0 });
+    refused(&|light| light.name = "x".repeat(201));
+    for edit in [
+        Edit::DeleteLight { light: LightId(0) },
+        Edit::RestoreLight { light: LightId(0) },
+        Edit::CopyLight { light: LightId(0), matrix: place },
+    ] {
+        assert_eq!(session.apply(&edit), Err(EditError::NotPlaceable(LightId(0))), "an object that shines");
+    }
+}
+
+/// An object with a dark picture, painted brighter than the picture's colour can be: the edited scene has a brighter picture.
+#[test]
+fn bright_paint_on_a_dark_picture_is_kept() {
+    let mut scene = cornell_box();
+    let texels = vec![[60, 60, 60, 255], [100, 100, 100, 255], [60, 60, 60, 255], [100, 100, 100, 255]];
+    scene.textures.push(Texture { name: "dark".to_owned(), width: 2, height: 2, texels });
+    let transform = glam::DAffine2::IDENTITY;
+    let wrap = [radiosity::Wrap::Repeat; 2];
+    let base_color_texture = Some(TextureRef { texture: 0, uv_set: 0, transform, wrap, nearest: false });
+    scene.materials.push(Material { base_color_texture, ..Material::default() });
+    scene.objects[0].material = scene.materials.len() - 1;
+    scene.uvs[0] = scene.positions.iter().map(|p| glam::DVec2::new(3.0 * p.x, 3.0 * p.z).as_vec2()).collect();
+    let mut session = Session::new(scene, &small()).unwrap();
+    let mean = session.model().objects[0].reflectance;
+    assert!(mean.iter().all(|rho| *rho < 0.2), "{mean:?}");
+    let wanted = [0.3, 0.5, 0.4];
+    session.apply(&Edit::Reflectance { object: ObjectId(0), reflectance: wanted }).unwrap();
+    let edited = session.edited_scene();
+    let (n, mut sum) = (40, [0f32; 3]);
+    let triangles = edited.objects[0].triangles.clone();
+    for triangle in triangles.clone() {
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let [x, y] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(n));
+            let uv = if x + y > 1.0 { [1.0 - x, 1.0 - y] } else { [x, y] };
+            let own = edited.reflectance(Surface { triangle, uv: uv.into() });
+            (0..3).for_each(|band| sum[band] += own[band] / (n * n) as f32 / triangles.len() as f32);
+        }
+    }
+    for band in 0..3 {
+        assert!((sum[band] - wanted[band]).abs() < 0.02 * wanted[band], "{sum:?}");
+    }
 }
 
 /// Light of a session against that of batch work on the scene as edited, at the centres of elements.
@@ -335,6 +489,13 @@ fn bad_edits_are_refused_by_name() {
     // All or nothing.
     let several = Edit::Several(vec![Edit::Delete { object }, place(identity)]);
     assert_eq!(refused(several), EditError::Deleted(object));
+    assert_eq!(session.edited_scene(), before);
+    let one = dimmed(0.5);
+    assert_eq!(session.apply(&Edit::Several(Vec::new())), Err(EditError::NoEdits));
+    let nested = Edit::Several(vec![one.clone(), Edit::Several(Vec::new())]);
+    assert_eq!(session.apply(&nested), Err(EditError::NoEdits));
+    let many = Edit::Several(vec![Edit::Several(vec![one; MOST_EDITS / 2]); 3]);
+    assert_eq!(session.apply(&many), Err(EditError::TooManyEdits(MOST_EDITS / 2 * 3)));
     assert_eq!(session.edited_scene(), before);
 
     let options = SessionOptions { memory: 1 << 20, ..small() };

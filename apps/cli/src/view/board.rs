@@ -13,6 +13,10 @@ use tokio::sync::watch;
 /// Vertices whose light is one notice: 6 kB. Fewer, and headers weigh; more, and a change sends what did not change.
 pub const CHUNK: usize = 1024;
 
+/// Layers whose light is looked after: of more, those that were asked for first rest until others are left. Each takes the
+/// time of some sweeps over all rays whenever light changes, and 6 bytes a vertex.
+pub const MOST_LAYERS: usize = 8;
+
 /// What a notice is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Subject {
@@ -96,7 +100,20 @@ struct Watched {
 struct Posts {
     revision: u64,
     notices: Latest<Subject, Notice>,
+    /// The one that was asked for last is last.
     layers: Vec<(Layer, Watched)>,
+}
+
+impl Posts {
+    /// Layers that are looked after; those that rest keep no light.
+    fn awake(&mut self) -> &mut [(Layer, Watched)] {
+        let resting = self.layers.len().saturating_sub(MOST_LAYERS);
+        let (resting, awake) = self.layers.split_at_mut(resting);
+        for (_, watched) in resting.iter_mut().filter(|(_, watched)| watched.is_known) {
+            *watched = Watched { pages: watched.pages, ..Watched::default() };
+        }
+        awake
+    }
 }
 
 /// What a page was sent.
@@ -153,7 +170,7 @@ impl Board {
         let mut posts = self.lock();
         let mut revision = posts.revision;
         // A layer that nobody looks at any more is not kept.
-        let Some((_, watched)) = posts.layers.iter_mut().find(|(of, _)| *of == layer) else { return };
+        let Some((_, watched)) = posts.awake().iter_mut().find(|(of, _)| *of == layer) else { return };
         for (chunk, values) in values.chunks(3 * CHUNK).enumerate() {
             let chunk = chunk as u32;
             let light = LightChunk { object, first: chunk * CHUNK as u32, values: values.to_vec() };
@@ -170,11 +187,15 @@ impl Board {
 
     /// A page looks at a layer from now on.
     pub fn watch(&self, layer: Layer) {
-        let mut posts = self.lock();
-        match posts.layers.iter_mut().find(|(of, _)| *of == layer) {
-            Some((_, watched)) => watched.pages += 1,
-            None => posts.layers.push((layer, Watched { pages: 1, ..Watched::default() })),
-        }
+        let layers = &mut self.lock().layers;
+        let known = layers.iter().position(|(of, _)| *of == layer).map(|place| layers.remove(place).1);
+        let known = known.unwrap_or_default();
+        layers.push((layer, Watched { pages: known.pages + 1, ..known }));
+    }
+
+    /// Whether a layer is not looked after, because there are too many others.
+    pub fn is_resting(&self, layer: Layer) -> bool {
+        !self.lock().awake().iter().any(|(of, _)| *of == layer)
     }
 
     /// A page does so no longer.
@@ -190,12 +211,12 @@ impl Board {
     /// then. One that nobody looked at for a moment is new again, as its light was not kept.
     pub fn layers(&self) -> Vec<(Layer, bool)> {
         let known = |watched: &mut Watched| !std::mem::replace(&mut watched.is_known, true);
-        self.lock().layers.iter_mut().map(|(layer, watched)| (*layer, known(watched))).collect()
+        self.lock().awake().iter_mut().map(|(layer, watched)| (*layer, known(watched))).collect()
     }
 
     /// Whether there is a layer that is new.
     pub fn has_new_layer(&self) -> bool {
-        self.lock().layers.iter().any(|(_, watched)| !watched.is_known)
+        self.lock().awake().iter().any(|(_, watched)| !watched.is_known)
     }
 
     /// The next notice that a page has not seen.
@@ -249,6 +270,26 @@ mod tests {
         assert_eq!(text(&board, &mut slow).as_deref(), Some("scene"));
         assert_eq!(text(&board, &mut slow).as_deref(), Some("999"));
         assert_eq!(text(&board, &mut slow), None);
+    }
+
+    #[test]
+    fn of_many_layers_those_asked_for_first_rest() {
+        let board = Board::new();
+        let most = MOST_LAYERS as u32;
+        (0..most + 2).for_each(|bounce| board.watch(Layer::Bounce(bounce)));
+        let awake = || board.layers().into_iter().map(|(layer, _)| layer).collect::<Vec<_>>();
+        assert_eq!(awake(), (2..most + 2).map(Layer::Bounce).collect::<Vec<_>>());
+        board.watch(Layer::Bounce(0));
+        board.watch(Layer::Total);
+        assert!(board.is_resting(Layer::Bounce(3)) && !board.is_resting(Layer::Bounce(0)));
+        let mut seen = Seen::default();
+        board.post_light(Layer::Bounce(4), 1, &[1; 30]);
+        assert_eq!(board.next_light(Layer::Bounce(4), &mut seen).len(), 1);
+        board.unwatch(Layer::Bounce(5));
+        assert!(!board.is_resting(Layer::Bounce(3)));
+        assert!(board.layers().contains(&(Layer::Bounce(3), true)), "its light is to be posted anew");
+        board.unwatch(Layer::Bounce(0));
+        assert!(board.is_resting(Layer::Bounce(2)), "one page still looks at bounce 0");
     }
 
     #[test]

@@ -79,6 +79,8 @@ pub enum Target {
     Presence(ObjectId),
     Light(LightId),
     LightPlace(LightId),
+    LightPresence(LightId),
+    NewLight,
 }
 
 /// Everything that an edit acts on, in order.
@@ -86,6 +88,10 @@ pub fn targets(edit: &Edit) -> Vec<Target> {
     match edit {
         Edit::Light { light, .. } => vec![Target::Light(*light)],
         Edit::MoveLight { light, .. } => vec![Target::LightPlace(*light)],
+        Edit::AddLight { .. } => vec![Target::NewLight],
+        Edit::CopyLight { light, .. } | Edit::DeleteLight { light } | Edit::RestoreLight { light } => {
+            vec![Target::LightPresence(*light)]
+        }
         Edit::Reflectance { object, .. } => vec![Target::Paint(*object)],
         Edit::Move { object, .. } => vec![Target::Place(*object)],
         Edit::Copy { object, .. } | Edit::Delete { object } | Edit::Restore { object } => {
@@ -108,6 +114,11 @@ pub fn label(edit: &Edit, model: &Model) -> String {
     match edit {
         Edit::Light { light: id, .. } => format!("dim {}", light(id)),
         Edit::MoveLight { light: id, .. } => format!("move {}", light(id)),
+        Edit::AddLight { light } if light.name.is_empty() => "add a light".to_owned(),
+        Edit::AddLight { light } => format!("add {}", light.name),
+        Edit::CopyLight { light: id, .. } => format!("duplicate {}", light(id)),
+        Edit::DeleteLight { light: id } => format!("delete {}", light(id)),
+        Edit::RestoreLight { light: id } => format!("restore {}", light(id)),
         Edit::Reflectance { object: id, .. } => format!("paint {}", object(id)),
         Edit::Move { object: id, .. } => format!("move {}", object(id)),
         Edit::Copy { object: id, .. } => format!("duplicate {}", object(id)),

@@ -10,6 +10,7 @@ mod board;
 mod files;
 mod guard;
 mod history;
+mod opening;
 mod server;
 mod solver;
 mod wire;
@@ -20,6 +21,7 @@ use crate::{Failure, Global, numbers, output};
 use board::Board;
 use clap::Args;
 use guard::Guard;
+use opening::Opening;
 use radiosity::session::{Session, SessionOptions};
 use radiosity::{Camera, Projection, Tracer};
 use serde_json::json;
@@ -114,7 +116,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     progress.finish();
 
     let url = address(&listener, &token)?;
-    announce(&url, arguments, global, progress)?;
+    // The file that leads the browser here is there until then.
+    let _opening = announce(&url, arguments, global, progress)?;
     runtime.block_on(serve(listener, &server, stopped, ended))?;
     // The solver may have ended by itself.
     let _ = commands.blocking_send(Command::Stop);
@@ -157,7 +160,12 @@ fn address(listener: &TcpListener, token: &str) -> Result<String, Failure> {
 }
 
 /// Tells the address, and opens it where there is a browser.
-fn announce(url: &str, arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
+fn announce(
+    url: &str,
+    arguments: &Arguments,
+    global: &Global,
+    progress: &Progress,
+) -> Result<Option<Opening>, Failure> {
     if global.json {
         output::print(&json!({ "event": "listening", "url": url, "seconds": progress.seconds() }).to_string())?;
     } else {
@@ -168,10 +176,20 @@ fn announce(url: &str, arguments: &Arguments, global: &Global, progress: &Progre
     if !is_local {
         progress.say("warning: the scene can be reached from other machines, by whoever has this address");
     }
-    if !arguments.no_open && open::that_detached(url).is_err() {
-        progress.say("note: no browser was found to open it");
+    if arguments.no_open {
+        return Ok(None);
     }
-    Ok(())
+    match Opening::new(url) {
+        Ok(opening) if open::that_detached(opening.path()).is_ok() => Ok(Some(opening)),
+        Ok(_) => {
+            progress.say("note: no browser was found to open it");
+            Ok(None)
+        }
+        Err(error) => {
+            progress.say(&format!("note: no browser was opened, as the file that leads it here cannot be written: {error}"));
+            Ok(None)
+        }
+    }
 }
 
 /// A view for who brings no camera.

@@ -1,12 +1,12 @@
 //! The server: the page, its pictures and files over HTTP, everything else over one WebSocket a page.
 
-use super::board::{Board, Notice, Seen};
+use super::board::{Board, MOST_LAYERS, Notice, Seen};
 use super::files;
 use super::guard::{Guard, Refusal};
 use super::solver::{Command, Export};
 use super::wire::{self, LONGEST, Request, Say};
 use axum::Router;
-use axum::body::Body;
+use axum::body::{Body, Bytes};
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, Request as HttpRequest, State};
 use axum::http::{HeaderValue, Method, StatusCode, header};
@@ -17,8 +17,9 @@ use radiosity::session::Layer;
 use radiosity::{Scene, Texture};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::{mpsc, oneshot};
+use tokio::time::MissedTickBehavior;
 
 /// The page, as `cargo xtask viewer` makes it.
 const PAGE: &str = include_str!("../../../viewer/dist/index.html");
@@ -35,6 +36,17 @@ const ANSWERS: usize = 64;
 /// A page that takes nothing for so long is gone.
 const PATIENCE: Duration = Duration::from_secs(30);
 
+/// How pages are asked whether they are still there: a machine that went to sleep or lost its network closes nothing.
+#[derive(Clone, Copy)]
+struct Pace {
+    /// So often.
+    ping: Duration,
+    /// One that says nothing for so long is gone; it misses two pings then.
+    silence: Duration,
+}
+
+const PACE: Pace = Pace { ping: Duration::from_secs(20), silence: Duration::from_secs(60) };
+
 /// What all requests share.
 pub struct Server {
     guard: Guard,
@@ -43,13 +55,15 @@ pub struct Server {
     textures: Vec<Texture>,
     pages: AtomicUsize,
     next_page: AtomicU64,
+    pace: Pace,
 }
 
 impl Server {
     /// For a scene whose solver listens to `commands` and posts on the board.
     pub fn new(guard: Guard, board: Arc<Board>, commands: mpsc::Sender<Command>, scene: &Scene) -> Arc<Server> {
         let textures = scene.textures.clone();
-        Arc::new(Server { guard, board, commands, textures, pages: AtomicUsize::new(0), next_page: AtomicU64::new(0) })
+        let (pages, next_page) = (AtomicUsize::new(0), AtomicU64::new(0));
+        Arc::new(Server { guard, board, commands, textures, pages, next_page, pace: PACE })
     }
 
     /// All that is answered.
@@ -175,12 +189,24 @@ struct Watch {
     board: Arc<Board>,
     layer: Layer,
     epoch: u32,
+    /// Whether the page knows that its layer rests.
+    is_told: bool,
 }
 
 impl Watch {
     fn new(board: &Arc<Board>, layer: Layer, epoch: u32) -> Watch {
         board.watch(layer);
-        Watch { board: board.clone(), layer, epoch }
+        Watch { board: board.clone(), layer, epoch, is_told: false }
+    }
+
+    /// What the page is to be told if its layer is not looked after.
+    fn complaint(&mut self) -> Option<String> {
+        let is_resting = self.board.is_resting(self.layer);
+        let is_news = !std::mem::replace(&mut self.is_told, is_resting) && is_resting;
+        let message = format!(
+            "Pages look at more than {MOST_LAYERS} different layers of light; this one stays as it is until one of them is left."
+        );
+        is_news.then(|| Say::Refused { message }.text())
     }
 }
 
@@ -199,6 +225,9 @@ async fn serve(place: Place, mut socket: WebSocket) {
     let mut seen = Seen::default();
     let mut watch: Option<Watch> = None;
     let mut is_caught_up = false;
+    let mut heard = Instant::now();
+    let mut ping = tokio::time::interval(server.pace.ping);
+    ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         news.mark_unchanged();
         let mut next = server.board.next_notice(&mut seen).map(|notice| match notice {
@@ -208,6 +237,9 @@ async fn serve(place: Place, mut socket: WebSocket) {
         if next.is_none() && !is_caught_up {
             is_caught_up = true;
             next = Some(Message::Text(Say::CaughtUp.text().into()));
+        }
+        if let (None, Some(watch)) = (&next, &mut watch) {
+            next = watch.complaint().map(|text| Message::Text(text.into()));
         }
         if let (None, Some(watch)) = (&next, &watch) {
             let chunks = server.board.next_light(watch.layer, &mut seen);
@@ -225,6 +257,7 @@ async fn serve(place: Place, mut socket: WebSocket) {
             biased;
             incoming = socket.recv() => match incoming {
                 Some(Ok(message)) => {
+                    heard = Instant::now();
                     if !receive(server, page, &message, &answer, &mut watch, &mut seen).await {
                         return;
                     }
@@ -233,6 +266,11 @@ async fn serve(place: Place, mut socket: WebSocket) {
             },
             Some(text) = answers.recv() => {
                 if !send(&mut socket, Message::Text(text.into())).await {
+                    return;
+                }
+            }
+            _ = ping.tick() => {
+                if heard.elapsed() > server.pace.silence || !send(&mut socket, Message::Ping(Bytes::new())).await {
                     return;
                 }
             }
@@ -288,4 +326,56 @@ fn refuse(answer: &mpsc::Sender<String>, what: &str) -> bool {
     // A page that does not read its answers misses them.
     let _ = answer.try_send(Say::Refused { message }.text());
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Read, Write};
+    use std::net::TcpStream;
+
+    /// A page that is there but says nothing, as if its machine slept: it is asked some times and then given up, and its place
+    /// is free.
+    #[test]
+    fn a_page_that_falls_silent_is_given_up() {
+        let pace = Pace { ping: Duration::from_millis(50), silence: Duration::from_millis(400) };
+        let guard = Guard::new("127.0.0.1").unwrap();
+        let token = guard.token().to_owned();
+        let (commands, _asked) = mpsc::channel(1);
+        let server = Server::new(guard, Arc::new(Board::new()), commands, &Scene::default());
+        let server = Arc::new(Server { pace, ..Arc::into_inner(server).unwrap() });
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let listener = runtime.block_on(tokio::net::TcpListener::bind(("127.0.0.1", 0))).unwrap();
+        let host = listener.local_addr().unwrap().to_string();
+        let router = server.router();
+        let (end, ended) = oneshot::channel::<()>();
+        let serving = std::thread::spawn(move || {
+            runtime.block_on(async {
+                tokio::select! {
+                    served = axum::serve(listener, router) => served.unwrap(),
+                    _ = ended => {}
+                }
+            });
+        });
+        let mut stream = TcpStream::connect(&host).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        write!(
+            stream,
+            "GET /{token}/socket HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nConnection: Upgrade\r\n\
+             Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        )
+        .unwrap();
+        let mut heard = Vec::new();
+        // To the end of the connection, which is the server's to make.
+        stream.read_to_end(&mut heard).unwrap();
+        let pings = heard.windows(2).filter(|bytes| *bytes == [0x89, 0]).count();
+        assert!(heard.starts_with(b"HTTP/1.1 101") && pings >= 3, "{pings} in {}", String::from_utf8_lossy(&heard));
+        let freed = (0..100).any(|_| {
+            std::thread::sleep(Duration::from_millis(20));
+            server.pages.load(Ordering::Relaxed) == 0
+        });
+        assert!(freed);
+        end.send(()).unwrap();
+        serving.join().unwrap();
+    }
 }

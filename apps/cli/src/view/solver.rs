@@ -16,6 +16,10 @@ const SLICE: Duration = Duration::from_millis(10);
 /// Light is posted this often at most; screens show no more.
 const EVERY: Duration = Duration::from_millis(33);
 
+/// While there is work, a layer besides the whole light waits this many times as long as it took last: late bounces would
+/// leave no time for anything else.
+const REST: u32 = 4;
+
 /// Cameras that are kept at most, and letters of their names.
 const MOST_CAMERAS: usize = 100;
 const LONGEST_NAME: usize = 80;
@@ -56,8 +60,10 @@ pub struct Solver {
     board: Arc<Board>,
     history: History,
     cameras: Vec<CameraPlace>,
-    /// Objects whose light is not yet posted.
+    /// Objects whose light has changed.
     changed: BTreeSet<ObjectId>,
+    /// Layers that pages look at.
+    shown: Vec<Shown>,
     last_post: Option<Instant>,
     is_done: bool,
     edits: u64,
@@ -69,6 +75,19 @@ pub struct Solver {
     latency: Option<f64>,
     /// Since when rays have been traced without a change, and how many there were.
     since: (Instant, u32),
+    /// Since when all rays have been there but for what edits have changed; none before.
+    settling: Option<Instant>,
+    /// Seconds that it took last from there to the end.
+    settled: Option<f64>,
+}
+
+/// A layer that pages look at.
+struct Shown {
+    layer: Layer,
+    /// Objects whose light is not yet posted.
+    owed: BTreeSet<ObjectId>,
+    /// When it was posted last, and how long that took.
+    last: Option<(Instant, Duration)>,
 }
 
 /// What an edit of a gesture changes; one that changes the same makes it outdated.
@@ -92,6 +111,7 @@ impl Solver {
             history: History::default(),
             cameras: Vec::new(),
             changed: BTreeSet::new(),
+            shown: Vec::new(),
             last_post: None,
             is_done: false,
             edits: 0,
@@ -99,6 +119,8 @@ impl Solver {
             held: None,
             latency: None,
             since: (Instant::now(), 0),
+            settling: None,
+            settled: None,
         };
         solver.post_scene(placed);
         solver.post_status();
@@ -215,7 +237,9 @@ impl Solver {
         let applied = self.session.apply(edit)?;
         (self.edited, self.is_done) = (self.edited.or(Some(since)), false);
         self.edits += 1;
-        self.since = (Instant::now(), self.session.status().rays);
+        let status = self.session.status();
+        self.since = (Instant::now(), status.rays);
+        self.settling = (status.rays == status.most_rays).then(Instant::now);
         self.post_model();
         Ok(applied.inverse)
     }
@@ -246,26 +270,56 @@ impl Solver {
             let step = self.session.step(SLICE);
             self.changed.extend(step.changed);
             (self.is_done, is_complete) = (step.is_done, step.is_complete || step.is_done);
+            let status = self.session.status();
+            if self.is_done {
+                self.settled = self.settling.take().map(|since| since.elapsed().as_secs_f64()).or(self.settled);
+            } else if status.rays == status.most_rays {
+                self.settling.get_or_insert_with(Instant::now);
+            }
         }
         let due = self.last_post.is_none_or(|last| last.elapsed() >= EVERY);
         if !(due || self.is_done || self.board.has_new_layer() || (is_complete && self.edited.is_some())) {
             return;
         }
-        for (layer, is_new) in self.board.layers() {
-            for object in &self.model.objects {
-                if (is_new || self.changed.contains(&object.id)) && !object.deleted {
-                    let light = wire::halves(&self.session.light(object.id, layer));
-                    self.board.post_light(layer, object.id.0, &light);
-                }
-            }
-        }
-        self.changed.clear();
+        self.post_light();
         self.last_post = Some(Instant::now());
         if let Some(edited) = self.edited.filter(|_| is_complete) {
             self.latency = Some(1e3 * edited.elapsed().as_secs_f64());
             self.edited = None;
         }
         self.post_status();
+    }
+
+    /// Light of the layers that are due.
+    fn post_light(&mut self) {
+        let mut layers = self.board.layers();
+        // What most pages look at first.
+        layers.sort_by_key(|(layer, _)| *layer != Layer::Total);
+        self.shown.retain(|shown| layers.iter().any(|(layer, _)| *layer == shown.layer));
+        for (layer, is_new) in layers {
+            let place = self.shown.iter().position(|shown| shown.layer == layer).unwrap_or_else(|| {
+                self.shown.push(Shown { layer, owed: BTreeSet::new(), last: None });
+                self.shown.len() - 1
+            });
+            let shown = &mut self.shown[place];
+            shown.owed.extend(&self.changed);
+            if is_new {
+                shown.owed.extend(self.model.objects.iter().map(|object| object.id));
+            }
+            let is_resting = shown.last.is_some_and(|(since, took)| since.elapsed() < REST * took);
+            if is_resting && !is_new && !self.is_done && layer != Layer::Total {
+                continue;
+            }
+            let started = Instant::now();
+            for id in std::mem::take(&mut shown.owed) {
+                if self.model.objects.get(id.0 as usize).is_some_and(|object| !object.deleted) {
+                    let light = wire::halves(&self.session.light(id, layer));
+                    self.board.post_light(layer, id.0, &light);
+                }
+            }
+            shown.last = Some((Instant::now(), started.elapsed()));
+        }
+        self.changed.clear();
     }
 
     fn say(&self, subject: Subject, text: String) {
@@ -297,13 +351,10 @@ impl Solver {
 
     /// Objects and lights; the board knows which of them are news.
     fn post_model(&mut self) {
-        let before: BTreeSet<ObjectId> = match self.last_post {
-            None => BTreeSet::new(),
-            Some(_) => self.model.objects.iter().map(|object| object.id).collect(),
-        };
-        self.model = self.session.model();
-        for object in &self.model.objects {
-            if !before.contains(&object.id) {
+        let known = if self.last_post.is_some() { self.model.objects.len() } else { 0 };
+        self.session.update_model(&mut self.model);
+        for (index, object) in self.model.objects.iter().enumerate() {
+            if index >= known {
                 self.board.post(Subject::Mesh(object.id.0), Notice::Binary(wire::mesh(object)));
                 self.changed.insert(object.id);
             }
@@ -330,6 +381,12 @@ impl Solver {
         let left = match traced {
             0 => None,
             _ => Some(start.elapsed().as_secs_f64() * f64::from(status.most_rays - status.rays) / f64::from(traced)),
+        };
+        // When all rays are there it takes about as long as the last time.
+        let left = match (self.settling, self.settled) {
+            (Some(since), Some(took)) => Some((took - since.elapsed().as_secs_f64()).max(0.0)),
+            (Some(_), None) => None,
+            _ => left,
         };
         let doing = match (self.is_done, self.edited.is_some()) {
             (true, _) => match self.latency {

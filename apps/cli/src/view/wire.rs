@@ -317,6 +317,18 @@ mod tests {
         let edit = r#"{"kind":"edit","edit":{"light":{"light":0,"dimming":0.5,"colour":[1,1,1]}},"gesture":3}"#;
         assert!(serde_json::from_str::<Request>(edit).is_ok());
         assert_eq!(serde_json::from_str::<Request>(r#"{"kind":"undo"}"#).unwrap(), Request::Undo);
+        let spot = r#"{"kind":{"spot":{"inner":0.3,"outer":0.6}},"position":[0,2,0],"direction":[0,-1,0],"intensity":[9,9,9]}"#;
+        let matrix = "[1,0,0,0,0,1,0,0,0,0,1,0,0.5,0,0,1]";
+        for right in [
+            format!(r#"{{"add_light":{{"light":{spot}}}}}"#),
+            r#"{"add_light":{"light":{"name":"sun","kind":"directional","intensity":[9,9,9]}}}"#.to_owned(),
+            format!(r#"{{"copy_light":{{"light":3,"matrix":{matrix}}}}}"#),
+            r#"{"delete_light":{"light":3}}"#.to_owned(),
+            r#"{"restore_light":{"light":3}}"#.to_owned(),
+        ] {
+            let request = format!(r#"{{"kind":"edit","edit":{right}}}"#);
+            assert!(serde_json::from_str::<Request>(&request).is_ok(), "{right}");
+        }
         let deep = format!(r#"{{"kind":"edit","edit":{}{}}}"#, r#"{"several":["#.repeat(50_000), "]}".repeat(50_000));
         for wrong in [
             "",
@@ -326,6 +338,8 @@ mod tests {
             r#"{"kind":"edit"}"#,
             r#"{"kind":"edit","edit":{"light":{"light":-1,"dimming":0.5,"colour":[1,1,1]}}}"#,
             r#"{"kind":"edit","edit":{"light":{"light":0,"dimming":1e999,"colour":[1,1,1]}}}"#,
+            r#"{"kind":"edit","edit":{"add_light":{"light":{"kind":"laser","intensity":[9,9,9]}}}}"#,
+            r#"{"kind":"edit","edit":{"add_light":{"light":{"kind":"point","intensity":[9,9,9],"extra":1}}}}"#,
             r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1]}"#,
             r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1,0.2],"extra":1}"#,
             &deep,

@@ -7,6 +7,51 @@ use serde::{Deserialize, Serialize};
 /// Most by which a light may be turned up.
 pub const MOST_DIMMING: f32 = 100.0;
 
+/// Most edits in one [`Edit::Several`], those within others counted.
+pub const MOST_EDITS: usize = 4096;
+
+/// Most lights of a session, those that were taken away counted: numbers are never given anew.
+pub const MOST_LIGHTS: usize = 4096;
+
+/// Most intensity of a light that is added, cd or lx: ten thousand suns.
+pub const MOST_INTENSITY: f32 = 1e9;
+
+/// A light without area that is to be added.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NewLight {
+    /// Name for people; may be empty.
+    #[serde(default)]
+    pub name: String,
+    /// Its kind.
+    pub kind: NewLightKind,
+    /// Where it is, world coordinates, metres; of no account for parallel light.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Where it shines to, of any length; of no account for points. Zero is down.
+    #[serde(default)]
+    pub direction: [f64; 3],
+    /// Candela per band, or lux per band of parallel light.
+    pub intensity: Bands,
+}
+
+/// Kinds of lights that may be added.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NewLightKind {
+    /// Shines in all directions.
+    Point,
+    /// Shines in a cone.
+    Spot {
+        /// Half angle inside which it is as bright as it gets, radians.
+        inner: f64,
+        /// Half angle outside which there is no light, radians; at most π/2.
+        outer: f64,
+    },
+    /// Parallel light.
+    Directional,
+}
+
 /// A change of the scene. Matrices are by columns and carry the object as the file places it, in world coordinates, to
 /// where it shall be: the identity is its place in the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +87,28 @@ pub enum Edit {
         /// From its place in the file to the new one.
         matrix: [f64; 16],
     },
+    /// Adds a light without area, which gets the next free id ([`Applied::added_lights`]).
+    AddLight {
+        /// The light.
+        light: NewLight,
+    },
+    /// Adds a copy of a light without area, dimmed and coloured alike.
+    CopyLight {
+        /// The light that is copied.
+        light: LightId,
+        /// From the place in the file to that of the copy.
+        matrix: [f64; 16],
+    },
+    /// Takes a light without area away. It keeps its id. Traces no ray.
+    DeleteLight {
+        /// The light.
+        light: LightId,
+    },
+    /// Brings a light back that was taken away. Traces no ray.
+    RestoreLight {
+        /// The light.
+        light: LightId,
+    },
     /// Adds a copy of an object, which gets the next free id ([`Applied::added`]).
     Copy {
         /// The object that is copied, as it is now.
@@ -59,7 +126,7 @@ pub enum Edit {
         /// The object.
         object: ObjectId,
     },
-    /// Several edits, one after the other; all or none of them.
+    /// Several edits, one after the other; all or none of them. One at least and [`MOST_EDITS`] at most.
     Several(Vec<Edit>),
 }
 
@@ -132,8 +199,26 @@ pub enum EditError {
         most: f64,
     },
     /// The light has no place of its own.
-    #[error("light {} cannot be placed by itself: it is the sky, or an object that shines (move that)", .0.0)]
+    #[error("light {} cannot be placed, copied or deleted by itself: it is the sky, or an object that shines (do it to that)", .0.0)]
     NotPlaceable(LightId),
+    /// The light was taken away before.
+    #[error("light {} has been deleted (restore it first)", .0.0)]
+    DeletedLight(LightId),
+    /// The light is there.
+    #[error("light {} has not been deleted", .0.0)]
+    LightNotDeleted(LightId),
+    /// A light that cannot be added.
+    #[error("the light cannot be added: {0}")]
+    NewLight(&'static str),
+    /// There are lights enough.
+    #[error("there are {MOST_LIGHTS} lights already, with those that were deleted; no more can be added")]
+    TooManyLights,
+    /// [`Edit::Several`] of nothing.
+    #[error("there is no edit among the several")]
+    NoEdits,
+    /// [`Edit::Several`] of too many.
+    #[error("{0} edits at once are too many; at most {MOST_EDITS}")]
+    TooManyEdits(usize),
     /// The memory that was allowed does not hold another object.
     #[error("another object would need {} in all; {} allowed", radiosity_scene::size(*needed), radiosity_scene::size(*allowed))]
     Memory {

@@ -1,11 +1,14 @@
 //! Edits are checked as a whole, then carried out; and the scene as they leave it.
 
-use super::edit::{Edit, EditError, MOST_DIMMING};
+use super::edit::{
+    Edit, EditError, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
+};
 use super::light::Light;
+use super::paint::brighter;
 use super::{LightId, MOST_COLUMNS, ObjectId, Session, bytes};
 use glam::{DAffine3, DMat4, DVec3};
 use radiosity_scene::material::MAX_REFLECTANCE;
-use radiosity_scene::{Scene, Sky, Source};
+use radiosity_scene::{PointLight, PointLightKind, Scene, Sky, Source};
 use radiosity_transport::live::REACH;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,9 +36,18 @@ struct Known {
     present: Vec<bool>,
     /// Which object each is a copy of.
     source: Vec<usize>,
-    lights: usize,
+    lights: Vec<KnownLight>,
     elements: usize,
 }
+
+#[derive(Clone, Copy)]
+struct KnownLight {
+    has_area: bool,
+    is_gone: bool,
+}
+
+/// Letters of the name of a light that is added.
+const LONGEST_NAME: usize = 200;
 
 impl Session {
     /// Whether an edit can be carried out.
@@ -44,9 +56,17 @@ impl Session {
         let mut known = Known {
             present: bodies.iter().map(|body| body.is_present).collect(),
             source: (0..bodies.len()).collect(),
-            lights: self.lights.len(),
+            lights: self
+                .lights
+                .iter()
+                .map(|light| KnownLight { has_area: light.point.is_none(), is_gone: light.is_gone })
+                .collect(),
             elements: self.live.ids(),
         };
+        let count = count(edit);
+        if count > MOST_EDITS {
+            return Err(EditError::TooManyEdits(count));
+        }
         self.check_one(edit, &mut known)
     }
 
@@ -56,9 +76,19 @@ impl Session {
             Some(false) => Err(EditError::Deleted(object)),
             Some(true) => Ok(known.source[object.0 as usize]),
         };
+        // Of lights without area, whether it is gone.
+        let placeable = |light: LightId, known: &Known| match known.lights.get(light.0 as usize) {
+            None => Err(EditError::UnknownLight(light)),
+            Some(KnownLight { has_area: true, .. }) => Err(EditError::NotPlaceable(light)),
+            Some(own) => Ok(own.is_gone),
+        };
+        let lit = |light: LightId, known: &Known| match placeable(light, known)? {
+            true => Err(EditError::DeletedLight(light)),
+            false => Ok(()),
+        };
         match edit {
             Edit::Light { light, dimming, colour } => {
-                if light.0 as usize >= known.lights {
+                if light.0 as usize >= known.lights.len() {
                     return Err(EditError::UnknownLight(*light));
                 }
                 if colour.iter().chain([dimming]).any(|x| !(0.0..=MOST_DIMMING).contains(x)) {
@@ -76,25 +106,36 @@ impl Session {
                 self.check_place(*object, source, matrix)?;
             }
             Edit::MoveLight { light, matrix } => {
-                let own = self.lights.get(light.0 as usize).ok_or(EditError::UnknownLight(*light))?;
-                if own.point.is_none() {
-                    return Err(EditError::NotPlaceable(*light));
-                }
+                lit(*light, known)?;
                 check_matrix(matrix)?;
+            }
+            Edit::AddLight { light } => {
+                self.check_light(light)?;
+                self.check_more(known, 0, Some(KnownLight { has_area: false, is_gone: false }))?;
+            }
+            Edit::CopyLight { light, matrix } => {
+                lit(*light, known)?;
+                check_matrix(matrix)?;
+                self.check_more(known, 0, Some(KnownLight { has_area: false, is_gone: false }))?;
+            }
+            Edit::DeleteLight { light } => {
+                lit(*light, known)?;
+                known.lights[light.0 as usize].is_gone = true;
+            }
+            Edit::RestoreLight { light } => {
+                if !placeable(*light, known)? {
+                    return Err(EditError::LightNotDeleted(*light));
+                }
+                known.lights[light.0 as usize].is_gone = false;
             }
             Edit::Copy { object, matrix } => {
                 let source = there(*object, known)?;
                 self.check_place(*object, source, matrix)?;
                 let body = &self.live.world().bodies[source];
-                known.elements += body.elements() as usize + 1;
-                known.lights += usize::from(self.objects[source].light.is_some());
+                let light = self.objects[source].light.map(|_| KnownLight { has_area: true, is_gone: false });
                 known.present.push(true);
                 known.source.push(source);
-                let columns = known.lights.min(MOST_COLUMNS);
-                let (needed, allowed) = (bytes(known.elements, self.live.most().rays, columns), self.memory);
-                if needed > allowed {
-                    return Err(EditError::Memory { needed, allowed });
-                }
+                self.check_more(known, body.elements() as usize + 1, light)?;
             }
             Edit::Delete { object } => {
                 there(*object, known)?;
@@ -106,12 +147,54 @@ impl Session {
                 Some(present) => *present = true,
             },
             Edit::Several(edits) => {
+                if edits.is_empty() {
+                    return Err(EditError::NoEdits);
+                }
                 for edit in edits {
                     self.check_one(edit, known)?;
                 }
             }
         }
         Ok(())
+    }
+
+    /// Whether there is room for more ids, and for a light.
+    fn check_more(&self, known: &mut Known, ids: usize, light: Option<KnownLight>) -> Result<(), EditError> {
+        if light.is_some() && known.lights.len() >= MOST_LIGHTS {
+            return Err(EditError::TooManyLights);
+        }
+        known.elements += ids;
+        known.lights.extend(light);
+        let columns = known.lights.len().min(MOST_COLUMNS);
+        let (needed, allowed) = (bytes(known.elements, self.live.most().rays, columns), self.memory);
+        if needed > allowed { Err(EditError::Memory { needed, allowed }) } else { Ok(()) }
+    }
+
+    /// Whether a light is one.
+    fn check_light(&self, light: &NewLight) -> Result<(), EditError> {
+        let world = self.live.world();
+        let refuse = |why| Err(EditError::NewLight(why));
+        if light.name.chars().count() > LONGEST_NAME {
+            return refuse("its name is longer than 200 letters");
+        }
+        if light.position.iter().chain(&light.direction).any(|x| !x.is_finite()) {
+            return refuse("its position or direction has a number that is not finite");
+        }
+        if light.intensity.iter().any(|x| !(0.0..=MOST_INTENSITY).contains(x)) {
+            return refuse("its intensity is negative, above 1e9 or no number");
+        }
+        let distance = (DVec3::from(light.position) - world.middle).abs().max_element();
+        if light.kind != NewLightKind::Directional && distance > REACH * world.half {
+            return refuse("it would be too far from the middle of the scene");
+        }
+        match light.kind {
+            NewLightKind::Spot { inner, outer }
+                if !(inner >= 0.0 && inner <= outer && outer > 0.0 && outer <= std::f64::consts::FRAC_PI_2) =>
+            {
+                refuse("the half angles of a spot are 0 or more, the outer one no less than the inner and at most π/2")
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_place(&self, object: ObjectId, source: usize, matrix: &[f64; 16]) -> Result<(), EditError> {
@@ -161,6 +244,35 @@ impl Session {
                 done.traces = true;
                 Edit::MoveLight { light: *light, matrix: before }
             }
+            Edit::AddLight { light } => {
+                let kind = match light.kind {
+                    NewLightKind::Point => PointLightKind::Point,
+                    NewLightKind::Spot { inner, outer } => PointLightKind::Spot { inner, outer },
+                    NewLightKind::Directional => PointLightKind::Directional,
+                };
+                let down = -self.scene.up.direction();
+                let point = PointLight {
+                    name: light.name.clone(),
+                    kind,
+                    position: light.position.into(),
+                    direction: DVec3::from(light.direction).try_normalize().unwrap_or(down),
+                    intensity: light.intensity,
+                    range: None,
+                };
+                self.put_light(Light::without_area(point), done)
+            }
+            Edit::CopyLight { light, matrix } => {
+                let copy = Light { matrix: *matrix, ..self.lights[light.0 as usize].clone() };
+                self.put_light(copy, done)
+            }
+            Edit::DeleteLight { light } => {
+                self.set_gone(*light, true, done);
+                Edit::RestoreLight { light: *light }
+            }
+            Edit::RestoreLight { light } => {
+                self.set_gone(*light, false, done);
+                Edit::DeleteLight { light: *light }
+            }
             Edit::Copy { object, matrix } => {
                 let original = self.objects[object.0 as usize].clone();
                 let added = self.live.copy(object.0 as usize, affine(matrix));
@@ -196,6 +308,25 @@ impl Session {
         }
     }
 
+    /// Adds a light without area; answers what takes it back.
+    fn put_light(&mut self, light: Light, done: &mut Done) -> Edit {
+        let index = self.lights.len();
+        self.add_light(light);
+        done.added_lights.push(index);
+        done.strands.insert(self.lights[index].strand);
+        done.traces = true;
+        Edit::DeleteLight { light: LightId(index as u32) }
+    }
+
+    /// Takes a light without area away or brings it back: it is dark meanwhile, and its rays stay.
+    fn set_gone(&mut self, light: LightId, is_gone: bool, done: &mut Done) {
+        let own = &mut self.lights[light.0 as usize];
+        own.is_gone = is_gone;
+        if self.strands[own.strand].is_shared {
+            done.dimmed.insert(own.strand);
+        }
+    }
+
     /// Notes that an object is elsewhere, with its light.
     fn touch(&mut self, index: usize, done: &mut Done) {
         done.objects.insert(index);
@@ -222,6 +353,8 @@ impl Session {
             lights: Vec::new(),
             ..from.clone()
         };
+        // Pictures that were painted brighter: which, by how much, and where the new one is.
+        let mut painted: Vec<(usize, [f32; 3], usize)> = Vec::new();
         for (index, (placed, body)) in self.objects.iter().zip(&self.live.world().bodies).enumerate() {
             if !body.is_present {
                 continue;
@@ -250,9 +383,30 @@ impl Session {
             let mut material = from.materials[object.material].clone();
             let is_as_it_was = material.clone();
             if let Some(coat) = placed.coat {
-                for ((base, coat), mean) in material.base_color.iter_mut().zip(coat).zip(placed.paint.mean) {
+                // What is above the most that a colour may be goes into the picture, or into the colours of vertices.
+                let mut excess = [1.0f32; 3];
+                for (band, excess) in excess.iter_mut().enumerate() {
+                    let (coat, mean) = (coat[band], placed.paint.mean[band]);
                     let keeps_pattern = placed.paint.is_varied && mean > 0.0;
-                    *base = if keeps_pattern { (*base * (coat / mean)).min(1.0) } else { coat };
+                    let wanted = if keeps_pattern { material.base_color[band] * (coat / mean) } else { coat };
+                    material.base_color[band] = wanted.min(1.0);
+                    *excess = wanted.max(1.0);
+                }
+                if let Some(texture) = material.base_color_texture.as_mut().filter(|_| excess != [1.0; 3]) {
+                    let known = painted.iter().find(|known| (known.0, known.1) == (texture.texture, excess));
+                    texture.texture = match known {
+                        Some((.., made)) => *made,
+                        None => {
+                            let made = scene.textures.len();
+                            scene.textures.push(brighter(&from.textures[texture.texture], excess));
+                            painted.push((texture.texture, excess, made));
+                            made
+                        }
+                    };
+                } else if !scene.colors.is_empty() {
+                    for colour in &mut scene.colors[first_vertex..] {
+                        (0..3).for_each(|band| colour[band] = (colour[band] * excess[band]).min(1.0));
+                    }
                 }
                 if !placed.paint.is_varied {
                     material.metallic = 0.0;
@@ -278,7 +432,7 @@ impl Session {
                 source,
             });
         }
-        for light in &self.lights {
+        for light in self.lights.iter().filter(|light| !light.is_gone) {
             let factor = light.factor();
             if let Some(mut point) = light.placed() {
                 (0..3).for_each(|band| point.intensity[band] *= factor[band]);
@@ -302,6 +456,14 @@ impl Session {
     /// The light with a number.
     pub(super) fn light_of(&self, light: LightId) -> Option<&Light> {
         self.lights.get(light.0 as usize)
+    }
+}
+
+/// How many edits one is; as far as it matters whether they are too many.
+fn count(edit: &Edit) -> usize {
+    match edit {
+        Edit::Several(edits) => edits.iter().map(count).sum::<usize>().max(1),
+        _ => 1,
     }
 }
 

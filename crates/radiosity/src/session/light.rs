@@ -26,12 +26,40 @@ pub struct Light {
     pub is_direct: bool,
     /// Where its light is solved.
     pub strand: usize,
+    /// Whether it was taken away by itself. Its rays stay.
+    pub is_gone: bool,
 }
 
 impl Light {
+    /// As the file has it, to which shadow rays go.
+    pub fn new(kind: LightKind, name: &str) -> Light {
+        Light {
+            kind,
+            name: name.to_owned(),
+            dimming: 1.0,
+            colour: [1.0; 3],
+            matrix: glam::DMat4::IDENTITY.to_cols_array(),
+            point: None,
+            body: None,
+            is_direct: true,
+            strand: 0,
+            is_gone: false,
+        }
+    }
+
+    /// A light without area.
+    pub fn without_area(point: PointLight) -> Light {
+        let kind = match point.kind {
+            PointLightKind::Point => LightKind::Point,
+            PointLightKind::Spot { .. } => LightKind::Spot,
+            PointLightKind::Directional => LightKind::Directional,
+        };
+        Light { point: Some(point.clone()), ..Light::new(kind, &point.name) }
+    }
+
     /// By what its light is multiplied.
     pub fn factor(&self) -> Bands {
-        self.colour.map(|c| c * self.dimming)
+        if self.is_gone { [0.0; 3] } else { self.colour.map(|c| c * self.dimming) }
     }
 
     /// A light without area where it is now.
@@ -76,35 +104,16 @@ pub fn is_direct(live: &Live, body: usize) -> bool {
 
 /// The lights of a scene: objects that shine, lights without area, the sky.
 pub fn lights_of(scene: &Scene, live: &Live) -> Vec<Light> {
-    let identity = glam::DMat4::IDENTITY.to_cols_array();
-    let light = |kind, name: &str| Light {
-        kind,
-        name: name.to_owned(),
-        dimming: 1.0,
-        colour: [1.0; 3],
-        matrix: identity,
-        point: None,
-        body: None,
-        is_direct: true,
-        strand: 0,
-    };
     let mut lights = Vec::new();
     for (body, object) in scene.objects.iter().enumerate() {
         if live.world().bodies[body].shape.exitance.iter().flatten().any(|e| *e > 0.0) {
             let is_direct = is_direct(live, body);
-            lights.push(Light { body: Some(body), is_direct, ..light(LightKind::Object, &object.name) });
+            lights.push(Light { body: Some(body), is_direct, ..Light::new(LightKind::Object, &object.name) });
         }
     }
-    for point in &scene.lights {
-        let kind = match point.kind {
-            PointLightKind::Point => LightKind::Point,
-            PointLightKind::Spot { .. } => LightKind::Spot,
-            PointLightKind::Directional => LightKind::Directional,
-        };
-        lights.push(Light { point: Some(point.clone()), ..light(kind, &point.name) });
-    }
+    lights.extend(scene.lights.iter().cloned().map(Light::without_area));
     if !scene.sky.is_black() {
-        lights.push(Light { is_direct: false, ..light(LightKind::Sky, "sky") });
+        lights.push(Light { is_direct: false, ..Light::new(LightKind::Sky, "sky") });
     }
     lights
 }

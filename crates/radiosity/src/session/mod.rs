@@ -42,7 +42,9 @@ mod probe;
 mod solve;
 mod state;
 
-pub use edit::{Applied, Edit, EditError, MOST_DIMMING};
+pub use edit::{
+    Applied, Edit, EditError, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
+};
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 
 use crate::Error;
@@ -126,8 +128,8 @@ pub struct Session {
     answer: Answer,
     state: State,
     memory: usize,
-    /// The layer that was asked for last, by id.
-    cache: Mutex<Option<Kept>>,
+    /// Layers that were asked for last, by id; the last of them last.
+    cache: Mutex<Vec<Kept>>,
 }
 
 /// A layer by id, and of which revision it is.
@@ -186,7 +188,7 @@ impl Session {
             answer: Answer::default(),
             state: State::dark(),
             memory: options.memory,
-            cache: Mutex::new(None),
+            cache: Mutex::default(),
         };
         lights.into_iter().for_each(|light| session.add_light(light));
         session.refresh_answer(0..session.objects.len());

@@ -107,7 +107,7 @@ pub struct ModelLight {
     pub matrix: [f64; 16],
     /// The object that it is.
     pub object: Option<ObjectId>,
-    /// Whether it went with its object.
+    /// Whether it was taken away, or its object.
     pub deleted: bool,
 }
 

@@ -3,7 +3,8 @@
 use glam::DVec2;
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::material::MAX_REFLECTANCE;
-use radiosity_scene::{Bands, Scene, Surface};
+use radiosity_scene::display::srgb;
+use radiosity_scene::{Bands, Scene, Surface, Texture};
 use radiosity_transport::live::Shape;
 
 /// Places along a side of the grid that pictures are averaged over.
@@ -73,6 +74,23 @@ impl Paint {
         });
         (rho, tau)
     }
+}
+
+/// A picture whose linear colours are multiplied, as far as a picture goes.
+pub fn brighter(texture: &Texture, factor: Bands) -> Texture {
+    // IEC 61966-2-1, as pictures are read.
+    let linear = |byte: usize| {
+        let s = byte as f32 / 255.0;
+        if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
+    };
+    let tables = factor.map(|factor| -> [u8; 256] {
+        std::array::from_fn(|byte| (255.0 * srgb((linear(byte) * factor).min(1.0))).round() as u8)
+    });
+    let texel = |[r, g, b, a]: &[u8; 4]| {
+        let [r, g, b] = [(0, r), (1, g), (2, b)].map(|(band, byte)| tables[band][usize::from(*byte)]);
+        [r, g, b, *a]
+    };
+    Texture { texels: texture.texels.iter().map(texel).collect(), ..texture.clone() }
 }
 
 fn mean_optics(scene: &Scene, shape: &Shape, element: u32, n: usize) -> (Bands, Bands) {

@@ -1,7 +1,7 @@
 //! What is read from a session: the model, layers of light, a place on a surface, its rays.
 
 use super::model::{LightKind, Probe};
-use super::{Display, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session};
+use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session};
 use glam::DVec2;
 use radiosity_scene::{Bands, Projection, Side, luminance};
 use radiosity_transport::live::{Chunk, Lanes};
@@ -9,6 +9,12 @@ use std::sync::Arc;
 
 /// Objects and lights that a probe tells of, at most.
 const MOST_TOLD: usize = 8;
+
+/// Bounces that are told apart; later ones show the last.
+const MOST_BOUNCES: u32 = 64;
+
+/// Layers that are kept, so that several pages may look at several, and bounces follow from those before them.
+const MOST_KEPT: usize = 8;
 
 /// An object that is less than this part of the scene wide is taken for one that can be moved.
 const MOVABLE: f64 = 0.5;
@@ -23,10 +29,31 @@ impl Session {
 
     /// What to draw.
     pub fn model(&self) -> Model {
+        let camera = |camera: &radiosity_scene::Camera| ModelCamera {
+            name: camera.name.clone(),
+            matrix: camera.world_from_camera.to_cols_array(),
+            vertical_fov: match camera.projection {
+                Projection::Perspective { vertical_fov } => Some(vertical_fov),
+                Projection::Orthographic { .. } => None,
+            },
+        };
+        let mut model = Model {
+            name: self.scene.name.clone(),
+            objects: Vec::new(),
+            lights: Vec::new(),
+            cameras: self.scene.cameras.iter().map(camera).collect(),
+            bounds: [[0.0; 3]; 2],
+            up: self.scene.up.direction().to_array(),
+        };
+        self.update_model(&mut model);
+        model
+    }
+
+    /// Brings a model of this session up to date. Triangles, which stay as they are, are made for new objects alone.
+    pub fn update_model(&self, model: &mut Model) {
         let world = self.live.world();
         let extent = |low: glam::DVec3, high: glam::DVec3| (high - low).max_element();
         let mut bounds: Option<[glam::DVec3; 2]> = None;
-        let mut objects = Vec::with_capacity(self.objects.len());
         for (index, (placed, body)) in self.objects.iter().zip(&world.bodies).enumerate() {
             if body.is_present {
                 let (low, high) = (body.bounds.low + world.middle, body.bounds.high + world.middle);
@@ -34,7 +61,6 @@ impl Session {
             }
             let object = &self.scene.objects[placed.source];
             let material = &self.scene.materials[object.material];
-            let display = self.display(index);
             let factor = placed.light.map_or([0.0; 3], |light| self.lights[light].factor());
             let exitance = &body.shape.exitance;
             let mean: Bands = std::array::from_fn(|band| {
@@ -49,47 +75,39 @@ impl Session {
                 None => [1.0; 3],
             };
             let base = [r, g, b];
-            objects.push(ModelObject {
-                id: ObjectId(index as u32),
-                name: object.name.clone(),
-                group: placed.group,
-                matrix: placed.matrix,
-                positions: display.positions.clone(),
-                normals: display.normals.clone(),
-                uvs: display.uvs.clone(),
-                indices: display.indices.clone(),
-                triangle_of: (0..body.elements())
-                    .map(|element| (body.shape.triangles.start + body.shape.place(element).0) as u32)
-                    .collect(),
-                reflectance: placed.coat.unwrap_or(placed.paint.mean),
-                texture: material.base_color_texture.map(|texture| texture.texture),
-                tint: std::array::from_fn(|band| base[band] * scale[band]),
-                emission: std::array::from_fn(|band| mean[band] * factor[band]),
-                deleted: !body.is_present,
-                movable: extent(body.bounds.low, body.bounds.high) < MOVABLE * 2.0 * world.half,
-                light: placed.light.map(|light| LightId(light as u32)),
-            });
+            if index == model.objects.len() {
+                let display = self.display(index);
+                let triangle = |element| (body.shape.triangles.start + body.shape.place(element).0) as u32;
+                model.objects.push(ModelObject {
+                    id: ObjectId(index as u32),
+                    name: object.name.clone(),
+                    group: placed.group,
+                    matrix: placed.matrix,
+                    positions: display.positions.clone(),
+                    normals: display.normals.clone(),
+                    uvs: display.uvs.clone(),
+                    indices: display.indices.clone(),
+                    triangle_of: (0..body.elements()).map(triangle).collect(),
+                    reflectance: [0.0; 3],
+                    texture: material.base_color_texture.map(|texture| texture.texture),
+                    tint: [0.0; 3],
+                    emission: [0.0; 3],
+                    deleted: false,
+                    movable: false,
+                    light: None,
+                });
+            }
+            let known = &mut model.objects[index];
+            known.matrix = placed.matrix;
+            known.reflectance = placed.coat.unwrap_or(placed.paint.mean);
+            known.tint = std::array::from_fn(|band| base[band] * scale[band]);
+            known.emission = std::array::from_fn(|band| mean[band] * factor[band]);
+            known.deleted = !body.is_present;
+            known.movable = extent(body.bounds.low, body.bounds.high) < MOVABLE * 2.0 * world.half;
+            known.light = placed.light.map(|light| LightId(light as u32));
         }
-        Model {
-            name: self.scene.name.clone(),
-            objects,
-            lights: self.model_lights(),
-            cameras: self
-                .scene
-                .cameras
-                .iter()
-                .map(|camera| ModelCamera {
-                    name: camera.name.clone(),
-                    matrix: camera.world_from_camera.to_cols_array(),
-                    vertical_fov: match camera.projection {
-                        Projection::Perspective { vertical_fov } => Some(vertical_fov),
-                        Projection::Orthographic { .. } => None,
-                    },
-                })
-                .collect(),
-            bounds: bounds.unwrap_or([world.middle; 2]).map(|corner| corner.to_array()),
-            up: self.scene.up.direction().to_array(),
-        }
+        model.lights = self.model_lights();
+        model.bounds = bounds.unwrap_or([world.middle; 2]).map(|corner| corner.to_array());
     }
 
     fn model_lights(&self) -> Vec<ModelLight> {
@@ -112,7 +130,7 @@ impl Session {
                 direction: direction.map(|point| point.direction.to_array()),
                 matrix: light.body.map_or(light.matrix, |body| self.objects[body].matrix),
                 object: light.body.map(|body| ObjectId(body as u32)),
-                deleted: !self.is_there(light),
+                deleted: light.is_gone || !self.is_there(light),
             }
         };
         self.lights.iter().enumerate().map(of).collect()
@@ -164,17 +182,20 @@ impl Session {
         (element < chunks[place].len).then_some((&chunks[place], element))
     }
 
-    /// A layer by id. The last one is kept, as it is asked for object by object.
+    /// A layer by id. The last ones are kept, as they are asked for object by object.
     fn layer(&self, layer: Layer) -> Arc<Vec<Lanes<4>>> {
         let mut cache = self.cache.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let revision = self.state.revision;
-        if let Some((kept, of, values)) = &*cache
-            && (*kept, *of) == (layer, revision)
-        {
-            return values.clone();
+        cache.retain(|(_, of, _)| *of == revision);
+        let kept = match cache.iter().position(|(kept, ..)| *kept == layer) {
+            Some(place) => cache.remove(place),
+            None => (layer, revision, Arc::new(self.find_layer(layer, &cache))),
+        };
+        if cache.len() == MOST_KEPT {
+            cache.remove(0);
         }
-        let values = Arc::new(self.find_layer(layer));
-        *cache = Some((layer, revision, values.clone()));
+        let values = kept.2.clone();
+        cache.push(kept);
         values
     }
 
@@ -192,7 +213,7 @@ impl Session {
         light
     }
 
-    fn find_layer(&self, layer: Layer) -> Vec<Lanes<4>> {
+    fn find_layer(&self, layer: Layer, known: &[Kept]) -> Vec<Lanes<4>> {
         let state = &self.state;
         match layer {
             Layer::Total => state.shown.clone(),
@@ -205,11 +226,20 @@ impl Session {
                 state.shown.iter().zip(direct).map(rest).collect()
             }
             Layer::Bounce(count) => {
-                let mut light = self.unreflected();
-                let nothing = vec![Lanes::default(); light.len()];
-                let mut given = nothing.clone();
-                for _ in 0..if state.solved_rays > 0 { count.min(64) } else { 0 } {
-                    self.answer.respond(&nothing, &light, &mut given);
+                let count = if state.solved_rays > 0 { count.min(MOST_BOUNCES) } else { 0 };
+                // From the last one before it that is known.
+                let before = |(kept, _, values): &Kept| match kept {
+                    Layer::Bounce(of) if *of <= count && values.len() == self.live.ids() => Some((*of, values.clone())),
+                    _ => None,
+                };
+                let nearest = known.iter().filter_map(before).max_by_key(|(of, _)| *of);
+                let (from, mut light) = nearest.map_or_else(
+                    || (0, self.unreflected()),
+                    |(of, values)| (of, values.to_vec()),
+                );
+                let mut given = vec![Lanes::default(); light.len()];
+                for _ in from..count {
+                    self.answer.reflect(&light, &mut given);
                     self.live.gather(&given, state.solved_rays as usize, &mut light);
                 }
                 light

@@ -219,8 +219,8 @@ impl Session {
         std::mem::swap(&mut quick.step, &mut quick.gathered);
         let factor = if is_last { tail(&self.answer, &quick.gathered, &quick.step) } else { [1.0; 3] };
         quick.h.par_iter_mut().zip(&mut quick.step).with_min_len(4096).for_each(|(h, step)| {
-            for k in 0..3 {
-                let now = (h.0[k] + factor[k] * step.0[k]).max(0.0);
+            for (k, factor) in factor.iter().enumerate() {
+                let now = (h.0[k] + factor * step.0[k]).max(0.0);
                 step.0[k] = now - std::mem::replace(&mut h.0[k], now);
             }
         });
