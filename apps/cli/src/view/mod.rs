@@ -186,7 +186,9 @@ fn announce(
             Ok(None)
         }
         Err(error) => {
-            progress.say(&format!("note: no browser was opened, as the file that leads it here cannot be written: {error}"));
+            progress.say(&format!(
+                "note: no browser was opened, as the file that leads it here cannot be written: {error}"
+            ));
             Ok(None)
         }
     }

@@ -1,9 +1,8 @@
 //! How the browser is told the address: by a file that only this user can read and that leads there. On its command line,
 //! which every user of the machine can see, the token would be one no more.
 
-use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
-use std::io::{Error, Write as _};
+use std::io::{Error, Write};
 use std::path::{Path, PathBuf};
 
 /// A file that leads to an address, until it is dropped.
@@ -21,9 +20,8 @@ impl Opening {
     fn within(folder: &Path, url: &str) -> std::io::Result<Opening> {
         let mut bytes = [0; 8];
         getrandom::fill(&mut bytes).map_err(|error| Error::other(error.to_string()))?;
-        let mut name = "radiosity-view-".to_owned();
-        bytes.iter().for_each(|byte| drop(write!(name, "{byte:02x}")));
-        let path = folder.join(name + ".html");
+        let name: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let path = folder.join(format!("radiosity-view-{name}.html"));
         // A file that is there already, or a link, is somebody else's.
         let mut file = create(&path)?;
         let opening = Opening { path };

@@ -1,8 +1,6 @@
 //! Edits are checked as a whole, then carried out; and the scene as they leave it.
 
-use super::edit::{
-    Edit, EditError, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
-};
+use super::edit::{Edit, EditError, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind};
 use super::light::Light;
 use super::paint::brighter;
 use super::{LightId, MOST_COLUMNS, ObjectId, Session, bytes};

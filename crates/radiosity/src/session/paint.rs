@@ -1,9 +1,9 @@
 //! Reflectance and transmittance of an object's elements, as the file has them and as they are painted.
 
 use glam::DVec2;
+use radiosity_scene::display::srgb;
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::material::MAX_REFLECTANCE;
-use radiosity_scene::display::srgb;
 use radiosity_scene::{Bands, Scene, Surface, Texture};
 use radiosity_transport::live::Shape;
 

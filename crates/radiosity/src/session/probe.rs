@@ -233,10 +233,8 @@ impl Session {
                     _ => None,
                 };
                 let nearest = known.iter().filter_map(before).max_by_key(|(of, _)| *of);
-                let (from, mut light) = nearest.map_or_else(
-                    || (0, self.unreflected()),
-                    |(of, values)| (of, values.to_vec()),
-                );
+                let (from, mut light) =
+                    nearest.map_or_else(|| (0, self.unreflected()), |(of, values)| (of, values.to_vec()));
                 let mut given = vec![Lanes::default(); light.len()];
                 for _ in from..count {
                     self.answer.reflect(&light, &mut given);

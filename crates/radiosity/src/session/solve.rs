@@ -97,7 +97,8 @@ pub fn tail(answer: &Answer, before: &[Lanes<4>], step: &[Lanes<4>]) -> [f32; 3]
     })
 }
 
-/// No room that is built gives back more of its light; noise must not make more of it.
+/// With more, the noise of the last step would be multiplied by more than five; rooms that give back more of their light are
+/// rare, and miss some of it for a moment.
 const MOST_QUOTIENT: f64 = 0.8;
 
 /// Elements that are summed together; sums of them are added in their order.

@@ -22,9 +22,10 @@ use std::time::Instant;
 /// Rays per element of the first picture.
 const FIRST_RAYS: u32 = 4;
 
-/// Sweeps from an edit to the first picture; the last one stands for those that would follow as well ([`tail`]). Two would
-/// not tell how fast they fall off; the exact light follows.
-const QUICK_SWEEPS: u32 = 3;
+/// Sweeps from an edit to the first picture; the last one stands for those that would follow as well ([`tail`]). Of what
+/// paint on a floor changes in a bright room, the picture misses 6 % then; 16 % with three sweeps, and as they were before, four
+/// with all rays and without a last one of that kind, 24 %. The exact light follows.
+const QUICK_SWEEPS: u32 = 4;
 
 /// Each sweep takes half as many rays as the one before it: it moves about half as much light.
 const LEAST_QUICK_RAYS: usize = 4;

@@ -315,7 +315,9 @@ mod tests {
     fn furnished() -> Arc<Scene> {
         let mut scene = Scene::default();
         scene.materials.push(radiosity_scene::Material { emissive: [1.0; 3], ..Default::default() });
-        for (name, low, high, is_room) in [("room", 0.0, 4.0, true), ("box", 1.6, 2.4, false), ("lamp", 3.0, 3.2, false)] {
+        for (name, low, high, is_room) in
+            [("room", 0.0, 4.0, true), ("box", 1.6, 2.4, false), ("lamp", 3.0, 3.2, false)]
+        {
             let at = |x: f64, y: f64, z: f64| DVec3::splat(low) + (high - low) * DVec3::new(x, y, z);
             let mut triangles = Vec::new();
             for axis in 0..3 {
