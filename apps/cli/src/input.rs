@@ -266,18 +266,50 @@ pub struct Input {
 /// Reads the scene and its sky; all faults at once.
 pub fn load(arguments: &SceneArguments, global: &Global, progress: &Progress) -> Result<Input, Failure> {
     let input = read(arguments)?;
-    for fault in &input.faults.0 {
-        if fault.severity > Severity::Note || global.verbose {
-            progress.say(&fault.to_string());
-        }
-    }
+    input.tell_faults(global, progress);
     Ok(input)
 }
 
 /// The same without telling anybody.
 pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
+    Ok(parse(arguments)?.examined())
+}
+
+/// A scene as it was read: not yet welded, its faults not yet looked for but by the reader.
+pub struct Parsed {
+    /// The scene.
+    pub scene: Scene,
+    faults: Faults,
+    document: Option<Document>,
+    files: Vec<PathBuf>,
+    title: String,
+}
+
+impl Parsed {
+    /// Welds it and finds its faults.
+    pub fn examined(self) -> Input {
+        let Parsed { scene, mut faults, document, files, title } = self;
+        let mesh = Mesh::new(&scene);
+        faults::find(&scene, &mesh, &title, &mut faults);
+        Input { scene, mesh, faults, document, files, title }
+    }
+}
+
+impl Input {
+    /// Tells the user what is wrong.
+    pub fn tell_faults(&self, global: &Global, progress: &Progress) {
+        for fault in &self.faults.0 {
+            if fault.severity > Severity::Note || global.verbose {
+                progress.say(&fault.to_string());
+            }
+        }
+    }
+}
+
+/// Reads a scene.
+pub fn parse(arguments: &SceneArguments) -> Result<Parsed, Failure> {
     arguments.refuse_what_has_no_effect()?;
-    let (mut scene, mut faults, document, files, title) = match &arguments.scene {
+    let (mut scene, faults, document, files, title) = match &arguments.scene {
         None => (radiosity::cornell_box(), Faults::default(), None, Vec::new(), "built-in Cornell box".to_owned()),
         Some(path) => {
             let options = LoadOptions {
@@ -293,9 +325,7 @@ pub fn read(arguments: &SceneArguments) -> Result<Input, Failure> {
     if let Some(sky) = &arguments.sky {
         set_sky(&mut scene, sky)?;
     }
-    let mesh = Mesh::new(&scene);
-    faults::find(&scene, &mesh, &title, &mut faults);
-    Ok(Input { scene, mesh, faults, document, files, title })
+    Ok(Parsed { scene, faults, document, files, title })
 }
 
 fn set_sky(scene: &mut Scene, text: &str) -> Result<(), Failure> {

@@ -89,9 +89,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let listener = runtime.block_on(listen(arguments))?;
 
     progress.part("reading");
-    let input = input::load(&arguments.scene, global, progress)?;
-    let has_view = |camera: &Camera| matches!(camera.projection, Projection::Perspective { .. });
-    let placed = (!input.scene.cameras.iter().any(has_view)).then(|| placed_camera(&input));
+    let parsed = input::parse(&arguments.scene)?;
     let options = SessionOptions {
         element_size: arguments.element_size,
         elements: arguments.elements,
@@ -99,7 +97,17 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         memory: arguments.memory,
         ..SessionOptions::default()
     };
-    let session = Session::new(input.scene, &options)?;
+    // Live light needs no welded mesh: that is for the faults and for a camera, and is made meanwhile.
+    let scene = parsed.scene.clone();
+    let examine = || {
+        let input = parsed.examined();
+        let has_view = |camera: &Camera| matches!(camera.projection, Projection::Perspective { .. });
+        let placed = (!input.scene.cameras.iter().any(has_view)).then(|| placed_camera(&input));
+        (input, placed)
+    };
+    let (session, (input, placed)) = rayon::join(|| Session::new(scene, &options), examine);
+    input.tell_faults(global, progress);
+    let session = session?;
 
     let board = Arc::new(Board::new());
     let (commands, asked) = mpsc::channel(WAITING);
