@@ -1,8 +1,9 @@
 // All that the page knows, and what can be done with it. Panels and keys call the verbs here and listen to topics.
 import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
+import { Ahead } from './ahead';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
-import { grid, type Grid } from './grid';
+import { lay, read, type Grid } from './grid';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
 import { corners, Stage, type Hit } from './stage';
@@ -35,6 +36,7 @@ export class App {
   readonly gizmo = new Gizmo(this);
   readonly connection: Connection;
   scene: SceneNotice | null = null;
+  /** Objects and lights as they are shown: what the server said, and what is changed here. */
   readonly objects = new Map<number, ObjectNotice>();
   readonly lights = new Map<number, LightNotice>();
   bookmarks: CameraPlace[] = [];
@@ -55,7 +57,13 @@ export class App {
   probed: Probed | null = null;
   grid: Grid | null = null;
   message = '';
+  private objectsAhead = new Ahead(this.objects, (object) => this.arrange(object.id));
+  private lightsAhead = new Ahead(this.lights, (light) => this.shed(light));
   private listeners = new Map<Topic, (() => void)[]>();
+  /** Topics that listeners are told of with the next picture. */
+  private news = new Set<Topic>();
+  /** Where copies will be that were asked for: the first that comes is selected. */
+  private awaited: number[][] = [];
   private loosened = new Set<number>();
   private textures = new Map<string, Texture>();
   private question = 0;
@@ -82,6 +90,18 @@ export class App {
     for (const listener of this.listeners.get(topic) ?? []) listener();
   }
 
+  /** Tells with the next picture: hundreds of notices come together. */
+  private tellSoon(topic: Topic): void {
+    this.news.add(topic);
+  }
+
+  /** Tells what has waited. */
+  tellNews(): void {
+    const topics = [...this.news];
+    this.news.clear();
+    topics.forEach((topic) => this.tell(topic));
+  }
+
   /** A line for the person. */
   say(message: string): void {
     this.message = message;
@@ -94,7 +114,11 @@ export class App {
     if (is === this.isConnected) return;
     this.isConnected = is;
     this.isCaughtUp = false;
-    if (is) this.say('');
+    if (is) {
+      this.say('');
+      this.objectsAhead.forget();
+      this.lightsAhead.forget();
+    }
     this.tell('connection');
   }
 
@@ -110,14 +134,11 @@ export class App {
         break;
       }
       case 'object':
-        this.objects.set(notice.id, notice);
-        this.arrange(notice.id);
-        this.tell('objects');
+        this.welcome(notice);
+        this.objectsAhead.hear(notice);
         break;
       case 'light':
-        this.lights.set(notice.id, notice);
-        this.marks.light(notice);
-        this.tell('lights');
+        this.lightsAhead.hear(notice);
         break;
       case 'status':
         this.status = notice;
@@ -146,6 +167,7 @@ export class App {
         break;
       case 'refused':
         this.say(notice.message);
+        this.takeBack();
         break;
     }
   }
@@ -159,31 +181,64 @@ export class App {
   }
 
   private mesh(frame: MeshFrame): void {
-    this.stage.put(new Surface(frame.object, frame));
+    const surface = new Surface(frame.object, frame);
+    this.stage.put(surface);
+    // What was laid on the old one, before the connection was lost, lies on the new one.
+    if (this.grid?.surface.object === frame.object) this.grid.surface = surface;
+    if (this.probed?.hit.surface.object === frame.object) this.probed.hit.surface = surface;
     this.arrange(frame.object);
   }
 
   /** An object and its triangles come apart. */
   private arrange(id: number): void {
     const [object, surface] = [this.objects.get(id), this.stage.surfaces.get(id)];
+    this.tellSoon('objects');
     if (!object || !surface) return;
     surface.visible = !object.deleted;
     surface.material.uniforms.tint.value.fromArray(object.tint);
     surface.material.uniforms.emission.value.fromArray(object.emission);
     surface.dress(object.texture ? this.texture(object.texture) : null);
-    // What is dragged here is ahead of what the server has seen.
-    if (!this.gizmo.isDragging || !this.group().includes(surface)) {
-      surface.matrix.fromArray(object.matrix);
-      this.stage.moved(surface);
-      this.followed(surface);
-    }
+    surface.matrix.fromArray(object.matrix);
+    this.stage.moved(surface);
+    this.followed(surface);
     if (object.deleted && this.selected === id) this.select(null);
     else if (this.group().includes(surface)) {
       this.marks.outline(this.group());
-      if (!this.gizmo.isDragging) this.gizmo.place();
+      this.gizmo.place();
+      this.tellSoon('selection');
     }
+    if (object.deleted && this.grid?.surface === surface) this.clearGrid();
     if (this.edges) this.marks.edges(this.stage.surfaces);
     this.stage.change();
+  }
+
+  /** A light is shown as it is now. */
+  private shed(light: LightNotice): void {
+    this.marks.light(light);
+    if (light.id === this.selectedLight) {
+      if (light.deleted) this.selectLight(null);
+      else this.gizmo.place();
+      this.tellSoon('selection');
+    }
+    this.tellSoon('lights');
+  }
+
+  /** Whether an object is one of the copies that were asked for. */
+  private welcome(object: ObjectNotice): void {
+    if (this.objects.has(object.id)) return;
+    const at = this.awaited.findIndex((matrix) => matrix.every((x, i) => Math.abs(x - object.matrix[i]) < 1e-9 * Math.max(1, Math.abs(x))));
+    if (at < 0) return;
+    this.awaited = [];
+    this.objects.set(object.id, object);
+    this.select(object.id);
+  }
+
+  /** What was refused is as before, here too. */
+  private takeBack(): void {
+    this.awaited = [];
+    this.objectsAhead.takeBack();
+    this.lightsAhead.takeBack();
+    for (const topic of ['objects', 'lights', 'selection'] as const) this.tell(topic);
   }
 
   private texture(use: TextureUse): Texture {
@@ -210,12 +265,14 @@ export class App {
 
   /** What depends on light is asked again while light changes. */
   private refresh(): void {
+    this.objectsAhead.expire();
+    this.lightsAhead.expire();
     if (!this.isCaughtUp || !this.status) return;
     const now = `${this.status.rays} ${this.status.edits} ${this.status.is_done} ${JSON.stringify(this.layer)}`;
     if (now === this.asked) return;
     this.asked = now;
     this.askProbe();
-    if (this.grid) this.measure();
+    this.readGrid();
   }
 
   private asked = '';
@@ -231,7 +288,9 @@ export class App {
     const send = () => {
       this.pending = null;
       this.lastSent = performance.now();
-      if (!this.connection.send({ kind: 'edit', edit, gesture })) this.say('Not connected: the change was not made.');
+      if (this.connection.send({ kind: 'edit', edit, gesture })) return;
+      this.say('Not connected: the change was not made.');
+      this.takeBack();
     };
     if (wait > 0) this.pending = { gesture, send, timer: setTimeout(send, wait) };
     else send();
@@ -255,21 +314,35 @@ export class App {
   }
 
   undo(): void {
-    this.flush();
-    this.connection.send({ kind: 'undo' });
+    this.goBack('undo');
   }
 
   redo(): void {
-    this.flush();
-    this.connection.send({ kind: 'redo' });
+    this.goBack('redo');
   }
 
-  setLight(light: LightNotice, change: { dimming?: number; colour?: number[] }, gesture?: number): void {
-    const { dimming = light.dimming, colour = light.colour } = change;
-    light.dimming = dimming;
-    light.colour = colour as [number, number, number];
-    this.edit({ light: { light: light.id, dimming, colour } }, gesture);
-    this.tell('lights');
+  private goBack(kind: 'undo' | 'redo'): void {
+    // What is held in the hand is put down first.
+    if (this.gizmo.isDragging) return;
+    this.flush();
+    this.objectsAhead.forget();
+    this.lightsAhead.forget();
+    if (!this.connection.send({ kind })) this.say('Not connected: nothing was changed.');
+  }
+
+  setLight({ id }: LightNotice, change: { dimming?: number; colour?: [number, number, number] }, gesture?: number): void {
+    this.lightsAhead.change(id, change);
+    const { dimming, colour } = this.lights.get(id)!;
+    this.edit({ light: { light: id, dimming, colour } }, gesture);
+  }
+
+  /** Moves a light without area by a motion of the world, from where it is or from a given place. */
+  moveLight(id: number, motion: Matrix4, gesture?: number, from: Pick<LightNotice, 'matrix' | 'position'> = this.lights.get(id)!): void {
+    const inScene = this.inScene(motion);
+    const matrix = inScene.clone().multiply(new Matrix4().fromArray(from.matrix)).toArray();
+    const position = from.position && new Vector3().fromArray(from.position).applyMatrix4(inScene).toArray();
+    this.lightsAhead.change(id, { matrix, position });
+    this.edit({ move_light: { light: id, matrix } }, gesture);
   }
 
   paint(object: number, reflectance: number[], gesture?: number): void {
@@ -301,10 +374,15 @@ export class App {
     this.tell('selection');
   }
 
+  /** A motion of the world in the scene's axes. */
+  private inScene(motion: Matrix4): Matrix4 {
+    const { matrixWorld } = this.stage.root;
+    return matrixWorld.clone().invert().multiply(motion).multiply(matrixWorld);
+  }
+
   /** Places of what is selected after a motion of the world. */
   private placed(motion: Matrix4, from = (surface: Surface) => surface.matrix): [Surface, Matrix4][] {
-    const { matrixWorld } = this.stage.root;
-    const inScene = matrixWorld.clone().invert().multiply(motion).multiply(matrixWorld);
+    const inScene = this.inScene(motion);
     return this.group().map((surface) => [surface, inScene.clone().multiply(from(surface))]);
   }
 
@@ -312,26 +390,33 @@ export class App {
   move(motion: Matrix4, gesture?: number, from?: (surface: Surface) => Matrix4): void {
     const edits: Edit[] = [];
     for (const [surface, matrix] of this.placed(motion, from)) {
-      const object = this.objects.get(surface.object)!;
-      object.matrix = matrix.toArray();
-      surface.matrix.copy(matrix);
-      this.stage.moved(surface);
-      this.followed(surface);
-      edits.push({ move: { object: object.id, matrix: object.matrix } });
+      const place = matrix.toArray();
+      this.objectsAhead.change(surface.object, { matrix: place });
+      edits.push({ move: { object: surface.object, matrix: place } });
     }
-    if (edits.length === 0) return;
-    this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
-    this.tell('selection');
+    if (edits.length > 0) this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
   }
 
-  /** Moves by a way and turns by an angle about the zenith through the middle of the thing. */
-  nudge(way: Vector3, angle: number): void {
-    if (!this.isMovable) return;
-    const middle = this.middle();
-    this.move(new Matrix4().makeTranslation(way.clone().add(middle))
+  /** Moves by a way and turns: by an angle about the zenith, and lamps about the right of who looks. */
+  nudge(way: Vector3, angle: number, tilt = 0): void {
+    const spot = this.spot();
+    if (!spot) {
+      if (this.selected !== null) this.say('It is large and stays put, unless “Let it move” is pressed in the panel.');
+      return;
+    }
+    const right = new Vector3(1, 0, 0).applyQuaternion(this.stage.camera.quaternion).setY(0).normalize();
+    const motion = new Matrix4().makeTranslation(way.clone().add(spot))
       .multiply(new Matrix4().makeRotationY(angle))
-      .multiply(new Matrix4().makeTranslation(middle.clone().negate())));
-    this.gizmo.place();
+      .multiply(new Matrix4().makeTranslation(spot.clone().negate()));
+    if (this.selectedLight === null) this.move(motion);
+    else this.moveLight(this.selectedLight, motion.multiply(about(spot, right, tilt)));
+  }
+
+  /** About what the selected thing or lamp turns, in the world; none if it cannot be moved. */
+  spot(): Vector3 | null {
+    const light = this.selectedLight === null ? undefined : this.lights.get(this.selectedLight);
+    if (light) return light.type === 'sky' ? null : this.stage.root.localToWorld(new Vector3().fromArray(light.position ?? [0, 0, 0]));
+    return this.isMovable ? this.middle() : null;
   }
 
   private box(): Box3 {
@@ -356,8 +441,9 @@ export class App {
     const way = right.multiplyScalar(0.6 * Math.max(size.x, size.z));
     const copies: Edit[] = this.placed(new Matrix4().makeTranslation(way))
       .map(([surface, matrix]) => ({ copy: { object: surface.object, matrix: matrix.toArray() } }));
+    this.awaited = copies.map((edit) => (edit as { copy: { matrix: number[] } }).copy.matrix);
+    this.say('Duplicated: the copy is selected.');
     this.edit(copies.length === 1 ? copies[0] : { several: copies });
-    this.say('Duplicated: the copy stands beside it.');
   }
 
   delete(): void {
@@ -372,6 +458,7 @@ export class App {
   }
 
   select(object: number | null): void {
+    this.awaited = [];
     this.selected = object;
     this.selectedLight = null;
     this.marks.outline(this.group());
@@ -384,6 +471,30 @@ export class App {
     this.selectedLight = light;
     this.gizmo.place();
     this.tell('selection');
+  }
+
+  /** Things and lamps that are there, by name: what can be selected. */
+  things(): { name: string; object?: number; light?: number }[] {
+    const groups = new Map<number, ObjectNotice>();
+    for (const object of this.objects.values()) if (!object.deleted && !groups.has(object.group)) groups.set(object.group, object);
+    const lamps = [...this.lights.values()].filter((light) => !light.deleted && light.object === null && light.type !== 'sky');
+    return [
+      ...[...groups.values()].map(({ id, name }) => ({ name: name || `Object ${id + 1}`, object: id })),
+      ...lamps.map(({ id, name }) => ({ name: name || `Light ${id + 1}`, light: id })),
+    ];
+  }
+
+  /** Selects the next thing, or the one before. */
+  selectNext(by: 1 | -1): void {
+    const things = this.things();
+    if (things.length === 0) return;
+    const group = this.selected === null ? undefined : this.objects.get(this.selected)?.group;
+    const now = things.findIndex(({ object, light }) =>
+      (light !== undefined && light === this.selectedLight) || (object !== undefined && this.objects.get(object)!.group === group));
+    const next = things[now < 0 ? (by > 0 ? 0 : things.length - 1) : (now + by + things.length) % things.length];
+    if (next.object !== undefined) this.select(next.object);
+    else this.selectLight(next.light!);
+    this.say(`Selected: ${next.name}.`);
   }
 
   /** Measures what is at a place of the canvas (−1..1 right and up) and selects its object. */
@@ -406,6 +517,7 @@ export class App {
   /** What is marked on a surface goes with it. */
   private followed(surface: Surface): void {
     this.marks.follow(surface);
+    if (this.grid?.surface === surface) this.readGrid();
     const hit = this.probed?.hit;
     if (hit?.surface !== surface) return;
     const [a, b, c] = corners(surface, hit.triangle).map((corner) => corner.applyMatrix4(surface.matrixWorld));
@@ -472,7 +584,16 @@ export class App {
   /** Lays a grid of measuring points over the surface that was picked. */
   measure(): void {
     if (!this.probed) return this.say('Pick a point of a surface first: the grid is laid over it.');
-    this.grid = grid(this.probed.hit);
+    this.grid = lay(this.probed.hit);
+    if (!this.grid) this.say('There is no plane surface to lay a grid over.');
+    this.marks.grid(this.grid);
+    this.tell('grid');
+  }
+
+  /** The grid where its surface is now, in the light of now. */
+  private readGrid(): void {
+    if (!this.grid) return;
+    read(this.grid);
     this.marks.grid(this.grid);
     this.tell('grid');
   }
@@ -498,9 +619,26 @@ export class App {
     this.connection.send({ kind: 'forget', name });
   }
 
+  /** On foot one looks where the pointer goes, until Escape. */
+  lookFreely(): void {
+    if (this.navigator.mode !== 'walk') this.walk('walk');
+    const { canvas } = this.stage;
+    canvas.focus();
+    Promise.resolve(canvas.requestPointerLock())
+      .then(() => this.say('The mouse looks around; click measures what is under the cross, Esc ends.'))
+      .catch(() => this.say('The browser did not give the mouse away; drag to look around.'));
+  }
+
   walk(mode: 'walk' | 'orbit'): void {
+    if (mode === 'orbit' && document.pointerLockElement) document.exitPointerLock();
     this.navigator.set(mode);
     this.tell('view');
   }
 }
 
+/** A turn about an axis through a point. */
+function about(point: Vector3, axis: Vector3, angle: number): Matrix4 {
+  return new Matrix4().makeTranslation(point)
+    .multiply(new Matrix4().makeRotationAxis(axis, angle))
+    .multiply(new Matrix4().makeTranslation(point.clone().negate()));
+}

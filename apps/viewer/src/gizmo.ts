@@ -4,6 +4,7 @@ import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { App } from './app';
 import { ACCENT } from './stage';
 import type { Surface } from './surface';
+import type { LightNotice } from './wire';
 
 export class Gizmo {
   private controls: TransformControls;
@@ -11,7 +12,7 @@ export class Gizmo {
   private handle = new Object3D();
   private start = new Matrix4();
   private places = new Map<Surface, Matrix4>();
-  private light: { matrix: number[]; position: number[] } | null = null;
+  private light: Pick<LightNotice, 'matrix' | 'position'> | null = null;
   private gesture = 0;
   isDragging = false;
 
@@ -38,10 +39,14 @@ export class Gizmo {
 
   setMode(mode: 'translate' | 'rotate'): void {
     this.controls.setMode(mode);
-    // A thing on a floor turns about the zenith; who wants more has the numbers.
-    this.controls.showX = this.controls.showZ = mode === 'translate';
+    this.offer();
     this.app.tell('selection');
     this.app.stage.change();
+  }
+
+  /** A thing on a floor turns about the zenith; a lamp every way. */
+  private offer(): void {
+    this.controls.showX = this.controls.showZ = this.mode === 'translate' || this.app.selectedLight !== null;
   }
 
   /** Whether the pointer is on a handle, and so on nothing else. */
@@ -49,9 +54,11 @@ export class Gizmo {
     return this.controls.axis !== null;
   }
 
-  /** Puts the handles to what is selected. */
+  /** Puts the handles to what is selected, unless they are held. */
   place(): void {
+    if (this.isDragging) return;
     const { app } = this;
+    this.offer();
     const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
     if (light?.position) this.handle.position.copy(app.stage.root.localToWorld(new Vector3().fromArray(light.position)));
     else if (app.isMovable) this.handle.position.copy(app.middle());
@@ -73,7 +80,7 @@ export class Gizmo {
     this.start.copy(this.handle.matrixWorld);
     this.places = new Map(app.group().map((surface) => [surface, surface.matrix.clone()]));
     const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
-    this.light = light ? { matrix: light.matrix, position: light.position! } : null;
+    this.light = light ?? null;
   }
 
   private drag(): void {
@@ -81,17 +88,8 @@ export class Gizmo {
     const { app } = this;
     this.handle.updateMatrixWorld();
     const motion = this.handle.matrixWorld.clone().multiply(this.start.clone().invert());
-    const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
-    if (light && this.light) {
-      const { matrixWorld } = app.stage.root;
-      const inScene = matrixWorld.clone().invert().multiply(motion).multiply(matrixWorld);
-      light.matrix = inScene.clone().multiply(new Matrix4().fromArray(this.light.matrix)).toArray();
-      light.position = new Vector3().fromArray(this.light.position).applyMatrix4(inScene).toArray();
-      app.marks.light(light);
-      app.edit({ move_light: { light: light.id, matrix: light.matrix } }, this.gesture);
-    } else {
-      app.move(motion, this.gesture, (surface) => this.places.get(surface) ?? surface.matrix);
-    }
+    if (app.selectedLight !== null && this.light) app.moveLight(app.selectedLight, motion, this.gesture, this.light);
+    else app.move(motion, this.gesture, (surface) => this.places.get(surface) ?? surface.matrix);
   }
 }
 

@@ -1,22 +1,30 @@
-// A measuring grid over a plane surface, with the spacing of EN 12464-1: p = 0.2 · 5^lg d, d the longer side.
-import { Vector3 } from 'three';
-import { DataUtils } from 'three';
-import { corners, type Hit } from './stage';
+// A measuring grid over a plane surface. Its cells are as EN 12464-1 asks: no longer than p = 0.2 · 5^lg d and 10 m, d the
+// longer side, or the shorter one where that is half of it or less. The number of cells is rounded up, so that they are
+// never larger. A grid stays where it was laid, goes with its surface, and is read again when light changes.
+import { DataUtils, DoubleSide, Ray, Vector3 } from 'three';
+import { luminance } from './luminance';
+import { barycentric, corners, type Hit } from './stage';
 import { UNIT, type Surface } from './surface';
 
-/** A point of a grid. */
+/** A point of a grid, and where on the surface it is: weights of the triangle's corners 1 and 2. */
 export interface GridPoint {
   point: Vector3;
+  triangle: number;
+  uv: [number, number];
+  /** Of the layer that is shown. */
   lux: number;
 }
 
-/** A grid that was measured. */
+/** A grid that was laid. */
 export interface Grid {
+  surface: Surface;
   points: GridPoint[];
-  normal: Vector3;
-  /** Metres between points. */
-  spacing: number;
+  /** Sides of the surface and of a cell, metres. */
   size: [number, number];
+  cell: [number, number];
+  /** Whether there would be more points than can be shown, so that cells are larger than the standard has them. */
+  isCoarse: boolean;
+  normal: Vector3;
   least: number;
   mean: number;
   largest: number;
@@ -28,23 +36,27 @@ export interface Grid {
 const FLAT = 1e-3;
 const PARALLEL = 0.9995;
 
-/** Illuminance at the vertices of a triangle, lx. */
-function lux(surface: Surface, triangle: number): number[] {
-  const values = surface.light.array as Uint16Array;
-  const index = surface.geometry.index!;
-  return [0, 1, 2].map((k) => {
-    const at = 3 * index.getX(3 * triangle + k);
-    const [r, g, b] = [0, 1, 2].map((band) => UNIT * DataUtils.fromHalfFloat(values[at + band]));
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  });
+/** The largest cell of the standard, metres. */
+const LARGEST = 10;
+
+/** Most points: more are too many to draw and to read. */
+const MOST = 10_000;
+
+/** How many cells a surface with these sides has each way. */
+export function cells(size: [number, number]): [number, number] {
+  const [longer, shorter] = [Math.max(...size), Math.min(...size)];
+  const d = longer >= 2 * shorter ? shorter : longer;
+  const p = Math.min(LARGEST, 0.2 * 5 ** Math.log10(d));
+  // What is a whole number but for rounding is that number.
+  return [Math.ceil(size[0] / p - 1e-9), Math.ceil(size[1] / p - 1e-9)];
 }
 
-export function grid({ surface, triangle }: Hit): Grid | null {
+/** Lays a grid over the plane that was hit. */
+export function lay({ surface, triangle }: Hit): Grid | null {
   const world = (k: number) => corners(surface, k).map((p) => p.applyMatrix4(surface.matrixWorld));
-  const first = world(triangle);
   const normalOf = ([a, b, c]: Vector3[]) => b.clone().sub(a).cross(c.clone().sub(a)).normalize();
-  const normal = normalOf(first);
-  const origin = first[0];
+  const first = world(triangle);
+  const [origin, normal] = [first[0], normalOf(first)];
   surface.geometry.boundingSphere ?? surface.geometry.computeBoundingSphere();
   const thick = FLAT * Math.max(1e-3, surface.geometry.boundingSphere!.radius * surface.matrixWorld.getMaxScaleOnAxis());
 
@@ -52,50 +64,69 @@ export function grid({ surface, triangle }: Hit): Grid | null {
   const up = new Vector3(0, 1, 0);
   const u = (Math.abs(normal.dot(up)) < 0.99 ? up.clone().cross(normal) : new Vector3(1, 0, 0).cross(normal).cross(normal).negate()).normalize();
   const v = normal.clone().cross(u);
-  const flat = (p: Vector3): [number, number] => [p.clone().sub(origin).dot(u), p.clone().sub(origin).dot(v)];
 
-  const triangles: { flat: [number, number][]; lux: number[] }[] = [];
+  const own = new Set<number>();
   const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
   for (let k = 0; k < surface.geometry.index!.count / 3; k += 1) {
     const points = world(k);
     if (normalOf(points).dot(normal) < PARALLEL) continue;
     if (points.some((p) => Math.abs(p.clone().sub(origin).dot(normal)) > thick)) continue;
-    const at = points.map(flat);
-    for (const p of at) {
-      for (const axis of [0, 1]) {
-        low[axis] = Math.min(low[axis], p[axis]);
-        high[axis] = Math.max(high[axis], p[axis]);
-      }
+    own.add(k);
+    for (const p of points) {
+      [u, v].forEach((axis, i) => {
+        const at = p.clone().sub(origin).dot(axis);
+        low[i] = Math.min(low[i], at);
+        high[i] = Math.max(high[i], at);
+      });
     }
-    triangles.push({ flat: at, lux: lux(surface, k) });
   }
   const size: [number, number] = [high[0] - low[0], high[1] - low[1]];
-  const [longer, shorter] = [Math.max(...size), Math.min(...size)];
-  if (!(shorter > 0)) return null;
-  const spacing = Math.min(10, 0.2 * 5 ** Math.log10(longer), shorter / 2);
-  const counts = size.map((side) => Math.max(2, Math.min(60, Math.round(side / spacing))));
+  if (!(Math.min(...size) > 0)) return null;
+  let counts = cells(size);
+  const isCoarse = counts[0] * counts[1] > MOST;
+  if (isCoarse) {
+    const share = Math.sqrt(MOST / (counts[0] * counts[1]));
+    counts = counts.map((count) => Math.max(1, Math.floor(count * share))) as [number, number];
+  }
+  const cell: [number, number] = [size[0] / counts[0], size[1] / counts[1]];
+
+  // A ray falls on the surface at the middle of each cell; where there is a hole, or something else, there is no point.
+  const inverse = surface.matrixWorld.clone().invert();
   const points: GridPoint[] = [];
   for (let j = 0; j < counts[1]; j += 1) {
     for (let i = 0; i < counts[0]; i += 1) {
-      const at: [number, number] = [low[0] + ((i + 0.5) / counts[0]) * size[0], low[1] + ((j + 0.5) / counts[1]) * size[1]];
-      const value = look(triangles, at);
-      if (value === null) continue;
-      points.push({ point: origin.clone().addScaledVector(u, at[0]).addScaledVector(v, at[1]), lux: value });
+      const at = origin.clone().addScaledVector(u, low[0] + (i + 0.5) * cell[0]).addScaledVector(v, low[1] + (j + 0.5) * cell[1]);
+      const ray = new Ray(at.clone().addScaledVector(normal, 2 * thick), normal.clone().negate()).applyMatrix4(inverse);
+      const hit = surface.tree.raycast(ray, DoubleSide).find(({ faceIndex }) => own.has(faceIndex!));
+      if (hit) points.push({ point: at, triangle: hit.faceIndex!, uv: barycentric(surface, hit.faceIndex!, hit.point), lux: 0 });
     }
   }
   if (points.length === 0) return null;
-  const values = points.map((p) => p.lux);
-  const mean = values.reduce((a, b) => a + b, 0) / values.length;
-  const least = Math.min(...values);
-  return { points, normal, spacing: longer / Math.max(...counts), size, least, mean, largest: Math.max(...values), uniformity: mean > 0 ? least / mean : 0 };
+  const grid: Grid = { surface, points, size, cell, isCoarse, normal, least: 0, mean: 0, largest: 0, uniformity: 0 };
+  read(grid);
+  return grid;
 }
 
-function look(triangles: { flat: [number, number][]; lux: number[] }[], [x, y]: [number, number]): number | null {
-  for (const { flat: [a, b, c], lux: values } of triangles) {
-    const double = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-    const v = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / double;
-    const w = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / double;
-    if (v >= -1e-9 && w >= -1e-9 && v + w <= 1 + 1e-9) return values[0] * (1 - v - w) + values[1] * v + values[2] * w;
+/** Reads a grid where its surface is now, in the light that is shown now. */
+export function read(grid: Grid): void {
+  const { surface } = grid;
+  const values = surface.light.array as Uint16Array;
+  const index = surface.geometry.index!;
+  for (const point of grid.points) {
+    const [v, w] = point.uv;
+    const weights = [1 - v - w, v, w];
+    const [a, b, c] = corners(surface, point.triangle).map((corner) => corner.applyMatrix4(surface.matrixWorld));
+    point.point.copy(a).multiplyScalar(weights[0]).addScaledVector(b, v).addScaledVector(c, w);
+    grid.normal.copy(b.sub(a).cross(c.sub(a)).normalize());
+    const light = [0, 0, 0];
+    weights.forEach((weight, k) => {
+      const at = 3 * index.getX(3 * point.triangle + k);
+      for (let band = 0; band < 3; band += 1) light[band] += weight * UNIT * DataUtils.fromHalfFloat(values[at + band]);
+    });
+    point.lux = luminance(light);
   }
-  return null;
+  const lux = grid.points.map((point) => point.lux);
+  grid.mean = lux.reduce((a, b) => a + b, 0) / lux.length;
+  [grid.least, grid.largest] = lux.reduce(([least, largest], x) => [Math.min(least, x), Math.max(largest, x)], [Infinity, 0]);
+  grid.uniformity = grid.mean > 0 ? grid.least / grid.mean : 0;
 }

@@ -3,7 +3,7 @@ import { Vector3 } from 'three';
 import type { App } from './app';
 import { screenshot } from './files';
 import { nextName } from './panels/cameras';
-import { el } from './panels/parts';
+import { el, toggle } from './panels/parts';
 import { shared } from './surface';
 
 /** What each key is for, as it is shown. */
@@ -13,8 +13,10 @@ const LIST: [string, [string, string][]][] = [
     ['↑ ↓ ← →', 'walk and turn'],
     ['R F', 'look up, down'],
     ['Q Z', 'rise, sink'],
+    ['Page ↑ ↓', 'look up, down while nothing is selected; with Shift rise, sink'],
     ['Shift', 'faster'],
     ['V', 'walk or orbit'],
+    ['Y', 'look with the mouse without pressing; Esc ends'],
     ['C', 'next camera'],
     ['B', 'keep this view'],
   ]],
@@ -29,11 +31,13 @@ const LIST: [string, [string, string][]][] = [
   ]],
   ['Measure and change', [
     ['Enter', 'measure and select what is under the cross'],
+    ['P  Shift+P', 'select the next thing or lamp, the one before'],
     ['G', 'grid on the picked surface'],
     ['J K', 'move the selected left, right'],
     ['U O', 'move it away, towards you'],
     ['Page ↑ ↓', 'move it up, down'],
     [', .', 'turn it'],
+    ['Home End', 'tilt the selected lamp'],
     ['M', 'handles: move or turn'],
     ['Ctrl+D', 'duplicate'],
     ['Delete', 'delete'],
@@ -52,12 +56,23 @@ const LIST: [string, [string, string][]][] = [
 const NUDGE = 0.1;
 const TURN = 5;
 
+/** Where it is kept that keys of one letter do nothing: who speaks to the machine would set them off (WCAG 2.1.4). */
+const LETTERS = 'radiosity.letters';
+let lettersAct = localStorage.getItem(LETTERS) !== 'off';
+
 /** The list of keys. */
 export function helpDialog(): HTMLDialogElement {
+  const letters = toggle('Keys of one letter or sign (off: all that they do is in the panel and the bar)', (is) => {
+    lettersAct = is;
+    localStorage.setItem(LETTERS, is ? 'on' : 'off');
+  });
+  letters.id = 'letters';
+  letters.set(lettersAct);
   const dialog = el('dialog', { id: 'help', 'aria-label': 'Keys' },
     el('div', { class: 'row' }, el('h2', {}, 'Keys'), el('span', { class: 'grow' }), el('button', { type: 'button', class: 'icon', 'aria-label': 'Close', click: () => dialog.close() }, '×')),
     el('div', { class: 'keys' }, ...LIST.map(([title, keys]) =>
       el('section', {}, el('h3', {}, title), el('dl', {}, ...keys.flatMap(([key, does]) => [el('dt', {}, el('kbd', {}, key)), el('dd', {}, does)]))))),
+    letters,
     el('p', { class: 'quiet' }, 'Drag to look around, click to measure and select, turn the wheel to step. On a touch screen: one finger looks, the stick walks.'));
   dialog.addEventListener('click', (event) => {
     if (event.target === dialog) dialog.close();
@@ -67,14 +82,16 @@ export function helpDialog(): HTMLDialogElement {
 
 export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold(): void }): void {
   const down = new Set<string>();
+  const is = (...keys: string[]) => (keys.some((key) => down.has(key)) ? 1 : 0);
+  // While nothing is selected that they would move.
+  const page = () => is('pageup') - is('pagedown');
   const drive = () => {
-    const is = (...keys: string[]) => (keys.some((key) => down.has(key)) ? 1 : 0);
     app.navigator.drive = {
       right: is('d') - is('a'),
-      up: is('q') - is('z'),
+      up: is('q') - is('z') + (down.has('shift') ? page() : 0),
       back: is('s', 'arrowdown') - is('w', 'arrowup'),
       yaw: is('arrowright') - is('arrowleft'),
-      pitch: is('r') - is('f'),
+      pitch: is('r') - is('f') + (down.has('shift') ? 0 : page()),
       fast: down.has('shift'),
     };
   };
@@ -97,6 +114,8 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     '0': () => app.exposure.automatic(),
     enter: () => app.pick(0, 0),
     g: () => app.measure(),
+    p: (event) => app.selectNext(event.shiftKey ? -1 : 1),
+    y: () => app.lookFreely(),
     m: () => app.gizmo.setMode(app.gizmo.mode === 'translate' ? 'rotate' : 'translate'),
     delete: () => app.delete(),
     backspace: () => app.delete(),
@@ -113,8 +132,14 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     pagedown: (event) => app.nudge(new Vector3(0, -size(event), 0), 0),
     ',': (event) => app.nudge(new Vector3(), angle(event)),
     '.': (event) => app.nudge(new Vector3(), -angle(event)),
+    home: (event) => tilt(angle(event)),
+    end: (event) => tilt(-angle(event)),
   };
   const size = (event: KeyboardEvent) => (event.shiftKey ? 0.1 : 1) * NUDGE * Math.min(1, app.stage.bounds.getSize(new Vector3()).length() / 5);
+  const tilt = (by: number) => {
+    if (app.selectedLight === null) app.say('Lamps without area can be tilted: select one first.');
+    else app.nudge(new Vector3(), 0, by);
+  };
   const angle = (event: KeyboardEvent) => ((event.shiftKey ? 0.2 : 1) * TURN * Math.PI) / 180;
 
   addEventListener('keydown', (event) => {
@@ -135,13 +160,13 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
       event.preventDefault();
       return;
     }
-    if (isField || event.altKey) return;
+    if (isField || event.altKey || (key.length === 1 && key !== ' ' && !lettersAct)) return;
     // What a focused control does itself.
-    if (target !== app.stage.canvas && target !== document.body && ['enter', ' ', 'arrowup', 'arrowdown', 'arrowleft', 'arrowright'].includes(key)) return;
-    if (held.has(key)) {
+    if (target !== app.stage.canvas && target !== document.body && ['enter', ' ', 'home', 'end', 'pageup', 'pagedown', 'arrowup', 'arrowdown', 'arrowleft', 'arrowright'].includes(key)) return;
+    if (held.has(key) || (key.startsWith('page') && app.selected === null && app.selectedLight === null)) {
       down.add(key);
       drive();
-      if (key.startsWith('arrow')) event.preventDefault();
+      if (key.length > 1 && key !== 'shift') event.preventDefault();
       return;
     }
     const act = acts[key];

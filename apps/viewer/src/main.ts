@@ -3,7 +3,7 @@ import './style.css';
 import { App } from './app';
 import { helpDialog, listen } from './keys';
 import { gridNumbers, legend } from './legend';
-import { bar } from './panels/bar';
+import { bar, duration } from './panels/bar';
 import { camerasPanel } from './panels/cameras';
 import { lightsPanel } from './panels/lights';
 import { gridPanel, meterPanel } from './panels/meter';
@@ -28,17 +28,26 @@ function start(): void {
   };
   const panel = el('aside', { class: 'panel', 'aria-label': 'Tools' },
     viewPanel(app), meterPanel(app), thingPanel(app), lightsPanel(app), gridPanel(app), camerasPanel(app));
-  const doing = el('span', { id: 'doing', role: 'status' });
+  const doing = el('span', { id: 'doing' });
+  // What is read out: only that the solution begins anew or is ready, and not each step of it.
+  const told = el('span', { id: 'told', class: 'unseen', role: 'status' });
   const message = el('span', { id: 'message', role: 'alert' });
   const numbers = gridNumbers(app);
   const cross = el('div', { class: 'cross', 'aria-hidden': 'true' });
   const veil = el('div', { class: 'veil' }, el('p', {}, 'Opening …'));
   const view = el('main', {}, app.stage.canvas, cross, numbers.element, legend(app), stick(app), veil);
-  document.body.append(bar(app, { help: () => help.showModal(), fold }), view, panel, el('footer', {}, doing, el('span', { class: 'grow' }), message), help);
+  document.body.append(bar(app, { help: () => help.showModal(), fold }), view, panel, el('footer', {}, doing, told, el('span', { class: 'grow' }), message), help);
   if (innerWidth < NARROW) fold();
   listen(app, { help, fold });
 
-  app.on('status', () => { doing.textContent = app.status?.doing ?? ''; });
+  app.on('status', () => {
+    const { status } = app;
+    if (!status) return;
+    const left = status.is_done || status.left === null ? '' : ` · about ${duration(status.left)} left`;
+    doing.textContent = status.doing + left;
+    const milestone = status.is_done ? 'The light is up to date.' : 'The light is being computed.';
+    if (told.textContent !== milestone) told.textContent = milestone;
+  });
   app.on('message', () => { message.textContent = app.message; });
   app.on('connection', () => {
     veil.hidden = app.isCaughtUp || (app.scene !== null && app.isConnected);
@@ -56,17 +65,22 @@ function start(): void {
     const box = canvas.getBoundingClientRect();
     const [x, y] = [event.clientX - box.left, event.clientY - box.top];
     const lamp = app.marks.lampAt(x, y);
-    if (lamp !== null) app.selectLight(lamp);
+    // A pointer that is locked points to the middle.
+    if (document.pointerLockElement === canvas) app.pick(0, 0);
+    else if (lamp !== null) app.selectLight(lamp);
     else app.pick((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
   });
   // The cross shows where a keyboard measures; a pointer has its own.
   addEventListener('keydown', () => document.body.classList.add('by-keys'));
   addEventListener('pointerdown', () => document.body.classList.remove('by-keys'));
 
+  document.addEventListener('pointerlockchange', () => document.body.classList.toggle('locked', document.pointerLockElement === canvas));
+
   let last = performance.now();
   const tick = (now: number) => {
     const passed = Math.min(100, now - last);
     last = now;
+    app.tellNews();
     app.navigator.update(passed / 1000);
     app.exposure.update(now, passed);
     app.stage.draw(now);

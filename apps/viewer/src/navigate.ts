@@ -15,9 +15,10 @@ const ROOM = 2.4;
 /** Highest step, as a share of the eye's height. */
 const STEP = 0.3;
 
-/** Radians a second by keys, and by each pixel of the pointer. */
+/** Radians a second by keys, and by each pixel of the pointer, dragged and locked. */
 const TURN = 1.6;
 const DRAG = 0.0042;
+const FREE = 0.0022;
 
 /** Which way one goes: right, up, back, and turning. */
 export interface Drive {
@@ -50,7 +51,7 @@ export class Navigator {
     this.orbit.addEventListener('change', () => stage.change());
     canvas.addEventListener('pointerdown', (event) => {
       canvas.focus({ preventScroll: true });
-      if (this.mode !== 'walk' || this.held || event.button > 1) return;
+      if (this.mode !== 'walk' || this.held || event.button > 1 || document.pointerLockElement) return;
       if (this.dragged === null) {
         this.dragged = event.pointerId;
         this.last = [event.clientX, event.clientY];
@@ -58,6 +59,11 @@ export class Navigator {
       }
     });
     canvas.addEventListener('pointermove', (event) => {
+      if (document.pointerLockElement === canvas && !this.held) {
+        // Freely one looks where the pointer goes; dragging pulls the picture along, the other way.
+        this.turn(-event.movementX * FREE, -event.movementY * FREE);
+        return;
+      }
       if (event.pointerId !== this.dragged || this.held) return;
       const [x, y] = [event.clientX - this.last[0], event.clientY - this.last[1]];
       this.last = [event.clientX, event.clientY];

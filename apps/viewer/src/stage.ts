@@ -326,7 +326,8 @@ export class Stage {
   }
 }
 
-function barycentric(surface: Surface, triangle: number, point: Vector3): [number, number] {
+/** Weights of corners 1 and 2 of a triangle at a point of it, in the surface's own frame. */
+export function barycentric(surface: Surface, triangle: number, point: Vector3): [number, number] {
   const [a, b, c] = corners(surface, triangle);
   const [ab, ac, ap] = [b.sub(a), c.sub(a), point.clone().sub(a)];
   const normal = ab.clone().cross(ac);

@@ -4,6 +4,7 @@ import {
   type IUniform,
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
+import { WEIGHTS } from './luminance';
 import { LEVELS, PALETTE } from './scale';
 import type { MeshFrame } from './wire';
 
@@ -15,7 +16,7 @@ export enum Mode { Eye, Lux, Meter }
 
 /** The curve of crates/scene/src/display.rs, the colours of a scale, and lines of equal illuminance. */
 const DISPLAY = /* glsl */ `
-  const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+  const vec3 LUMINANCE = vec3(${WEIGHTS.join(', ')});
   const float KNEE = 0.5;
   const float WHITE = 8.0;
 

@@ -1,6 +1,7 @@
 // What tests read from the page and do to it, as `window.radiosity`.
 import { DataUtils, Vector3 } from 'three';
 import type { App } from './app';
+import { luminance } from './luminance';
 import { corners } from './stage';
 import { UNIT } from './surface';
 
@@ -15,8 +16,8 @@ export function tests(app: App) {
     const values = hit.surface.light.array as Uint16Array;
     const index = hit.surface.geometry.index!;
     const weights = [1 - hit.uv[0] - hit.uv[1], ...hit.uv];
-    return [0.2126, 0.7152, 0.0722].reduce((sum, share, band) => sum + share * UNIT * weights.reduce((mean, weight, k) =>
-      mean + weight * DataUtils.fromHalfFloat(values[3 * index.getX(3 * hit.triangle + k) + band]), 0), 0);
+    return luminance([0, 1, 2].map((band) => UNIT * weights.reduce((mean, weight, k) =>
+      mean + weight * DataUtils.fromHalfFloat(values[3 * index.getX(3 * hit.triangle + k) + band]), 0)));
   };
   return {
     app,

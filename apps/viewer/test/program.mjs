@@ -1,5 +1,5 @@
-// The program and pages that look at it, for tests. RADIOSITY and CHROMIUM say where the programs are; screenshots go to
-// out/viewer of the repository.
+// The program and pages that look at it, for tests. RADIOSITY and CHROMIUM say where the programs are, PAGE a page that was
+// just built, to be tried in place of the one that the program carries; screenshots go to out/viewer of the repository.
 import { spawn, spawnSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -40,12 +40,15 @@ export async function browser() {
     executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
     headless: true,
     args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run',
-      '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+      '--disable-background-networking', '--disable-component-update', '--disable-sync',
+      // A page that is put in the place of another has no address, and so no way to this machine.
+      ...(process.env.PAGE ? ['--disable-features=LocalNetworkAccessChecks'] : [])],
   });
   return {
     close: () => own.close(),
     async open(url, { width = 1400, height = 900, touch = false } = {}) {
       const context = await own.newContext({ viewport: { width, height }, hasTouch: touch, isMobile: touch, acceptDownloads: true });
+      if (process.env.PAGE) await context.route(url, instead);
       const page = await context.newPage();
       page.faults = [];
       page.asked = [];
@@ -60,6 +63,13 @@ export async function browser() {
       return page;
     },
   };
+}
+
+/** Answers with `PAGE`, under the policy of the program. */
+async function instead(route) {
+  const response = await route.fetch();
+  const [nonce] = /(?<=nonce-)[0-9a-f]+/.exec(response.headers()['content-security-policy']);
+  await route.fulfill({ response, body: readFileSync(process.env.PAGE, 'utf8').replaceAll('nonce="NONCE"', `nonce="${nonce}"`) });
 }
 
 export const state = (page) => page.evaluate(() => window.radiosity.state());

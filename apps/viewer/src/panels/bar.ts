@@ -15,13 +15,15 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
   const redo = button('↷', () => app.redo(), { key: 'Ctrl+Y', title: 'Redo', kind: 'icon' });
   undo.setAttribute('aria-label', 'Undo');
   redo.setAttribute('aria-label', 'Redo');
-  const menu = el('div', { class: 'menu', role: 'menu', hidden: true },
-    el('button', { type: 'button', role: 'menuitem', click: () => { screenshot(app); open(false); } }, 'Screenshot', el('span', { class: 'quiet' }, '.png')),
-    el('a', { role: 'menuitem', href: 'lit.glb', download: '', click: () => open(false) }, 'Lit model', el('span', { class: 'quiet' }, '.glb')),
-    el('a', { role: 'menuitem', href: 'scene.glb', download: '', click: () => open(false) }, 'Edited scene', el('span', { class: 'quiet' }, '.glb')));
+  const menu = el('div', { class: 'menu', id: 'saves', role: 'menu', 'aria-labelledby': 'save', hidden: true },
+    el('button', { type: 'button', role: 'menuitem', tabindex: -1, click: () => { screenshot(app); open(false); } }, 'Screenshot', el('span', { class: 'quiet' }, '.png')),
+    el('a', { role: 'menuitem', tabindex: -1, href: 'lit.glb', download: '', click: () => open(false) }, 'Lit model', el('span', { class: 'quiet' }, '.glb')),
+    el('a', { role: 'menuitem', tabindex: -1, href: 'scene.glb', download: '', click: () => open(false) }, 'Edited scene', el('span', { class: 'quiet' }, '.glb')));
   const save = button('Save', () => open(menu.hidden !== false), { title: 'Screenshot, lit model, edited scene' });
   save.id = 'save';
   save.setAttribute('aria-haspopup', 'menu');
+  save.setAttribute('aria-expanded', 'false');
+  save.setAttribute('aria-controls', 'saves');
   const open = (is: boolean) => {
     menu.hidden = !is;
     save.setAttribute('aria-expanded', String(is));
@@ -30,14 +32,22 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
   document.addEventListener('pointerdown', (event) => {
     if (!menu.hidden && !menu.parentElement!.contains(event.target as Node)) open(false);
   });
+  // Whoever goes on with Tab leaves it.
+  menu.addEventListener('focusout', ({ relatedTarget }) => {
+    if (relatedTarget !== save && !menu.contains(relatedTarget as Node | null)) open(false);
+  });
   menu.addEventListener('keydown', (event) => {
     const items = [...menu.children] as HTMLElement[];
     const at = items.indexOf(document.activeElement as HTMLElement);
     if (event.key === 'ArrowDown') items[(at + 1) % items.length].focus();
     else if (event.key === 'ArrowUp') items[(at + items.length - 1) % items.length].focus();
-    else if (event.key === 'Escape') {
-      open(false);
+    else if (event.key === 'Home') items[0].focus();
+    else if (event.key === 'End') items[items.length - 1].focus();
+    else if (event.key === 'Escape' || event.key === 'Tab') {
+      // From the button Tab goes on to what comes next.
       save.focus();
+      open(false);
+      if (event.key === 'Tab') return;
     } else return;
     event.preventDefault();
     event.stopPropagation();

@@ -1,7 +1,8 @@
 // Lights: on and off, dimming, colour.
 import type { App } from '../app';
+import { luminance } from '../luminance';
 import type { LightNotice } from '../wire';
-import { button, el, hex, linear, section, slider } from './parts';
+import { button, el, hex, isOpen, linear, section, slider } from './parts';
 
 const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', directional: 'Directional', sky: 'Sky' };
 
@@ -65,14 +66,14 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
       element.classList.toggle('off', now.dimming === 0);
       dimming.set(100 * now.dimming);
       const peak = Math.max(...now.colour, 1e-9);
-      if (document.activeElement !== colour) colour.value = hex(now.colour.map((c) => c / peak));
+      if (!isOpen(colour)) colour.value = hex(now.colour.map((c) => c / peak));
     },
   };
 }
 
 /** The factor by band that tints light and keeps its luminance. */
-function filter(value: string): number[] {
+function filter(value: string): [number, number, number] {
   const [r, g, b] = linear(value);
-  const luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  return luminance > 1e-3 ? [r, g, b].map((c) => c / luminance) : [1, 1, 1];
+  const whole = luminance([r, g, b]);
+  return whole > 1e-3 ? [r / whole, g / whole, b / whole] : [1, 1, 1];
 }

@@ -1,8 +1,10 @@
 // What is measured: at a point, and on a grid.
 import type { App } from '../app';
+import { luminance } from '../luminance';
 import { readable } from '../scale';
 import type { Share } from '../wire';
 import { button, el, fact, hex, section } from './parts';
+import { layerName } from './view';
 
 export function meterPanel(app: App): HTMLElement {
   const none = el('p', { class: 'quiet' }, 'Click a surface, or press Enter for what is under the cross.');
@@ -22,7 +24,6 @@ export function meterPanel(app: App): HTMLElement {
       return;
     }
     lux.replaceChildren(readable(answer.illuminance), el('span', { class: 'unit' }, 'lx'));
-    const luminance = (c: number[]) => 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
     const point = app.stage.toScene(probed.hit.point);
     facts.replaceChildren(
       fact('Reflectance', el('span', {}, el('i', { class: 'swatch', style: `background:${hex(answer.reflectance)}` }), `${(100 * luminance(answer.reflectance)).toFixed(1)} %`)),
@@ -42,22 +43,28 @@ function bar({ name, share }: Share): HTMLElement {
 
 export function gridPanel(app: App): HTMLElement {
   const facts = el('div', { class: 'facts' });
+  const layer = el('p', { class: 'warning' });
+  const metres = (sides: number[]) => `${sides.map((side) => side.toFixed(2)).join(' × ')} m`;
   const clear = button('Take away', () => app.clearGrid());
   app.on('grid', () => {
     clear.hidden = !app.grid;
     facts.hidden = !app.grid;
+    layer.hidden = !app.grid || app.layer === 'total';
     if (!app.grid) return;
-    const { least, mean, largest, uniformity, points, spacing, size } = app.grid;
+    layer.textContent = `Not all light, but the layer that is shown: ${layerName(app, app.layer)}.`;
+    const { least, mean, largest, uniformity, points, cell, size, isCoarse } = app.grid;
     facts.replaceChildren(
       fact('Mean', `${readable(mean)} lx`),
       fact('Least', `${readable(least)} lx`),
       fact('Most', `${readable(largest)} lx`),
       fact('Uniformity', uniformity.toFixed(2)),
-      fact('Points', `${points.length}, ${spacing.toFixed(2)} m apart`),
-      fact('Surface', `${size.map((side) => side.toFixed(2)).join(' × ')} m`),
+      fact('Points', String(points.length)),
+      fact('Cells', metres(cell) + (isCoarse ? ', coarser than the standard' : '')),
+      fact('Surface', metres(size)),
     );
   });
+  app.on('view', () => { if (app.grid) app.tell('grid'); });
   return section('grid', 'Measuring grid', false,
-    el('p', { class: 'quiet' }, 'Over the plane surface that was picked, spaced as EN 12464-1 asks.'),
-    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G' }), clear), facts);
+    el('p', { class: 'quiet' }, 'Over the whole plane that was picked, in cells no larger than EN 12464-1 asks. It stays there until another is laid.'),
+    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G' }), clear), layer, facts);
 }

@@ -15,15 +15,29 @@ export function el<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: At
   return element;
 }
 
+/** A key as it is shown to people, as `aria-keyshortcuts` names it. */
+function shortcut(key?: string): string | undefined {
+  return key?.replace('Ctrl', 'Control').replace('+ −', 'Plus Minus');
+}
+
+/** Whether a person is writing in a field: what is not yet said stays. */
+export function isOpen(input: HTMLInputElement): boolean {
+  return input.dataset.open !== undefined;
+}
+
+// A field is open from the first letter until it is said or left.
+addEventListener('input', ({ target }) => { (target as HTMLElement).dataset.open = ''; }, { capture: true });
+for (const end of ['change', 'focusout']) addEventListener(end, ({ target }) => { delete (target as HTMLElement).dataset?.open; }, { capture: true });
+
 /** A button; `key` is the key that does the same. */
 export function button(label: string, act: () => void, { key, title, kind = '' }: { key?: string; title?: string; kind?: string } = {}): HTMLButtonElement {
   const help = [title ?? label, key ? `(${key})` : ''].filter(Boolean).join(' ');
-  return el('button', { type: 'button', class: kind, title: help, 'aria-keyshortcuts': key, click: () => act() }, label);
+  return el('button', { type: 'button', class: kind, title: help, 'aria-keyshortcuts': shortcut(key), click: () => act() }, label);
 }
 
 /** A switch. */
 export function toggle(label: string, act: (is: boolean) => void, key?: string): HTMLLabelElement & { set(is: boolean): void } {
-  const input = el('input', { type: 'checkbox', role: 'switch', change: () => act(input.checked) });
+  const input = el('input', { type: 'checkbox', role: 'switch', 'aria-keyshortcuts': shortcut(key), change: () => act(input.checked) });
   const made = el('label', { class: 'toggle', title: key ? `${label} (${key})` : label }, input, el('i'), el('span', {}, label), key ? el('kbd', {}, key) : null);
   return Object.assign(made, { set: (is: boolean) => { input.checked = is; } });
 }
@@ -43,8 +57,8 @@ export function slider(
   const number = el('input', { type: 'number', step, 'aria-label': `${label}${unit ? `, ${unit}` : ''}`, change: () => give(number, true) });
   const set = (value: number) => {
     const text = String(Number(value.toFixed(2)));
-    if (document.activeElement !== number) number.value = text;
-    range.value = text;
+    if (!isOpen(number)) number.value = text;
+    if (!isOpen(range)) range.value = text;
     const share = (100 * (Math.min(max, Math.max(min, value)) - min)) / (max - min);
     range.style.setProperty('--share', `${share}%`);
   };
@@ -60,13 +74,28 @@ export function slider(
 /** A choice of one of a few, all in sight. */
 export function choice<T extends string>(label: string, options: [T, string, string?][], act: (value: T) => void): HTMLDivElement & { set(value: T): void } {
   const buttons = options.map(([value, text, key]) =>
-    el('button', { type: 'button', role: 'radio', title: key ? `${text} (${key})` : text, 'data-value': value, click: () => act(value) }, text));
+    el('button', {
+      type: 'button', role: 'radio', title: key ? `${text} (${key})` : text, 'aria-keyshortcuts': shortcut(key), 'data-value': value, click: () => act(value),
+    }, text));
+  // One of them is in the order of Tab, and arrows lead to the others, as in every group of radio buttons.
   const set = (value: T) => {
     for (const one of buttons) {
-      one.setAttribute('aria-checked', String(one.dataset.value === value));
+      const is = one.dataset.value === value;
+      one.setAttribute('aria-checked', String(is));
+      one.tabIndex = is ? 0 : -1;
     }
   };
-  return Object.assign(el('div', { class: 'choice', role: 'radiogroup', 'aria-label': label }, ...buttons), { set });
+  const group = el('div', { class: 'choice', role: 'radiogroup', 'aria-label': label }, ...buttons);
+  group.addEventListener('keydown', (event) => {
+    const way = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+    if (!way) return;
+    const at = (buttons.indexOf(event.target as HTMLButtonElement) + way + buttons.length) % buttons.length;
+    buttons[at].focus();
+    act(options[at][0]);
+    event.preventDefault();
+    event.stopPropagation();
+  });
+  return Object.assign(group, { set });
 }
 
 /** A name and a value. */

@@ -2,7 +2,8 @@
 import { Vector3 } from 'three';
 import type { App } from '../app';
 import { turnOf } from '../gizmo';
-import { button, choice, el, hex, linear, section } from './parts';
+import { luminance } from '../luminance';
+import { button, choice, el, hex, isOpen, linear, section } from './parts';
 
 export function thingPanel(app: App): HTMLElement {
   let gesture: number | null = null;
@@ -33,17 +34,45 @@ export function thingPanel(app: App): HTMLElement {
   const mode = choice('Handles', [['translate', 'Move', 'M'], ['rotate', 'Turn', 'M']], (value) => app.gizmo.setMode(value));
   const copy = button('Duplicate', () => app.duplicate(), { key: 'Ctrl+D' });
   const remove = button('Delete', () => app.delete(), { key: 'Delete', kind: 'danger' });
-  const spot = (): Vector3 => app.stage.toScene(app.middle());
   const put = (axis: number | null) => {
-    const object = app.selected === null ? undefined : app.objects.get(app.selected);
-    if (!object || !app.scene) return;
+    const [placed, spot] = [chosen(), app.spot()];
+    if (!placed || !spot || !app.scene) return;
     if (axis !== null) {
-      const way = new Vector3().setComponent(axis, places[axis].valueAsNumber - spot().getComponent(axis));
+      const way = new Vector3().setComponent(axis, places[axis].valueAsNumber - app.stage.toScene(spot).getComponent(axis));
       if (Number.isFinite(way.lengthSq())) app.nudge(way.applyQuaternion(app.stage.root.quaternion), 0);
     } else {
-      const angle = ((turn.valueAsNumber - turnOf(object.matrix, new Vector3(...app.scene.up))) * Math.PI) / 180;
+      const angle = ((turn.valueAsNumber - turnOf(placed.matrix, new Vector3(...app.scene.up))) * Math.PI) / 180;
       if (Number.isFinite(angle)) app.nudge(new Vector3(), angle);
     }
+  };
+  /** The thing or the lamp that is selected. */
+  const chosen = () => (app.selectedLight !== null ? app.lights.get(app.selectedLight) : app.selected !== null ? app.objects.get(app.selected) : undefined);
+
+  // A list to select from, for those who do not point.
+  const list = el('select', {
+    id: 'things', 'aria-label': 'Select a thing or a lamp', 'aria-keyshortcuts': 'P Shift+P', change: () => {
+      const [kind, id] = list.value.split(' ');
+      if (kind === 'object') app.select(Number(id));
+      else if (kind === 'light') app.selectLight(Number(id));
+      else app.select(null);
+    },
+  });
+  let names = '';
+  const offer = () => {
+    const things = app.things();
+    const now = JSON.stringify(things);
+    if (now !== names) {
+      const seen = new Map<string, number>();
+      list.replaceChildren(el('option', { value: '' }, 'Nothing selected'), ...things.map(({ name, object, light }) => {
+        const count = (seen.get(name) ?? 0) + 1;
+        seen.set(name, count);
+        return el('option', { value: object === undefined ? `light ${light}` : `object ${object}` }, count > 1 ? `${name} (${count})` : name);
+      }));
+    }
+    names = now;
+    const group = app.selected === null ? undefined : app.objects.get(app.selected)?.group;
+    const first = things.find(({ object }) => object !== undefined && app.objects.get(object)!.group === group);
+    list.value = app.selectedLight !== null ? `light ${app.selectedLight}` : first ? `object ${first.object}` : '';
   };
   const moving = el('div', {},
     el('div', { class: 'row' }, mode),
@@ -51,34 +80,39 @@ export function thingPanel(app: App): HTMLElement {
       el('label', {}, el('span', { class: 'quiet' }, '°'), turn)));
   const fixed = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Large, so it stays put.'), button('Let it move', () => app.loosen()));
   const painting = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Reflectance'), paint, reflectance, el('span', { class: 'unit' }, '%'));
-  const body = el('div', {}, name, painting, moving, fixed, el('div', { class: 'row' }, copy, remove));
-  const none = el('p', { class: 'quiet' }, 'Click a thing, or press Enter for what is under the cross.');
+  const copying = el('div', { class: 'row' }, copy, remove);
+  const body = el('div', {}, name, painting, moving, fixed, copying);
+  const none = el('p', { class: 'quiet' }, 'Click a thing, press Enter for what is under the cross, or P for one after the other.');
 
   const show = () => {
     const object = app.selected === null ? undefined : app.objects.get(app.selected);
     const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
-    body.hidden = !object;
-    none.hidden = Boolean(object);
-    none.textContent = light ? `${light.name || 'The light'}: drag its handles to move it.` : 'Click a thing, or press Enter for what is under the cross.';
-    if (!object) return;
-    name.textContent = object.name || `Object ${object.id + 1}`;
-    const editing = document.activeElement;
-    if (editing !== paint) paint.value = hex(object.reflectance);
-    if (editing !== reflectance) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
-    moving.hidden = !app.isMovable;
-    fixed.hidden = app.isMovable;
-    const at = spot();
+    offer();
+    const placed = object ?? light;
+    body.hidden = !placed;
+    none.hidden = Boolean(placed);
+    if (!placed) return;
+    name.textContent = object ? object.name || `Object ${object.id + 1}` : light!.name || `Light ${light!.id + 1}`;
+    painting.hidden = copying.hidden = !object;
+    if (object) {
+      if (!isOpen(paint)) paint.value = hex(object.reflectance);
+      if (!isOpen(reflectance)) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
+    }
+    const spot = app.spot();
+    moving.hidden = !spot;
+    fixed.hidden = !object || spot !== null;
+    if (!spot) return;
+    const at = app.stage.toScene(spot);
     places.forEach((input, k) => {
-      if (editing !== input) input.value = at.getComponent(k).toFixed(3);
+      if (!isOpen(input)) input.value = at.getComponent(k).toFixed(3);
+      // Parallel light has no place.
+      input.disabled = light?.position === null;
     });
-    if (editing !== turn) turn.value = String(Math.round(10 * turnOf(object.matrix, new Vector3(...(app.scene?.up ?? [0, 1, 0])))) / 10);
+    if (!isOpen(turn)) turn.value = String(Math.round(10 * turnOf(placed.matrix, new Vector3(...(app.scene?.up ?? [0, 1, 0])))) / 10);
     mode.set(app.gizmo.mode);
   };
   app.on('selection', show);
   app.on('objects', show);
-  return section('thing', 'Selected', true, none, body);
-}
-
-function luminance([r, g, b]: number[]): number {
-  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  app.on('lights', offer);
+  return section('thing', 'Selected', true, el('div', { class: 'row' }, list), none, body);
 }

@@ -2,7 +2,17 @@
 import type { App } from '../app';
 import { shared } from '../surface';
 import type { Layer } from '../wire';
-import { button, choice, el, section, slider, toggle } from './parts';
+import { button, choice, el, isOpen, section, slider, toggle } from './parts';
+
+/** What people call a layer. */
+export function layerName(app: App, layer: Layer): string {
+  if (layer === 'total') return 'All light';
+  if (layer === 'direct') return 'Direct light';
+  if (layer === 'indirect') return 'Indirect light';
+  if (layer === 'error') return 'Estimated error';
+  if ('bounce' in layer) return layer.bounce === 1 ? 'First bounce' : `Bounce ${layer.bounce}`;
+  return app.lights.get(layer.light)?.name || `Light ${layer.light + 1}`;
+}
 
 /** Bounces that have a layer of their own. */
 const BOUNCES = 6;
@@ -29,17 +39,17 @@ export function viewPanel(app: App): HTMLElement {
     button('Auto', () => app.exposure.setRange(null), { title: 'Fit the scale to what is seen' }));
 
   const options = () => {
-    const option = (value: Layer, text: string) => el('option', { value: JSON.stringify(value) }, text);
-    const lights = [...app.lights.values()].map((light) => option({ light: light.id }, light.name || `Light ${light.id + 1}`));
-    const bounces = Array.from({ length: BOUNCES }, (_, i) => option({ bounce: i + 1 }, i === 0 ? 'First bounce' : `Bounce ${i + 1}`));
-    layer.replaceChildren(option('total', 'All light'), option('direct', 'Direct light'), option('indirect', 'Indirect light'),
+    const option = (value: Layer) => el('option', { value: JSON.stringify(value) }, layerName(app, value));
+    const lights = [...app.lights.values()].filter((light) => !light.deleted).map((light) => option({ light: light.id }));
+    const bounces = Array.from({ length: BOUNCES }, (_, i) => option({ bounce: i + 1 }));
+    layer.replaceChildren(option('total'), option('direct'), option('indirect'),
       el('optgroup', { label: 'Bounces' }, ...bounces), lights.length > 0 ? el('optgroup', { label: 'Lights alone' }, ...lights) : '',
-      option('error', 'Estimated error'));
+      option('error'));
     layer.value = JSON.stringify(app.layer);
   };
   let names = '';
   app.on('lights', () => {
-    const now = [...app.lights.values()].map((light) => light.name).join('\n');
+    const now = [...app.lights.values()].map((light) => `${light.name} ${light.deleted}`).join('\n');
     if (now !== names || layer.options.length === 0) options();
     names = now;
   });
@@ -53,7 +63,7 @@ export function viewPanel(app: App): HTMLElement {
     layer.value = JSON.stringify(app.layer);
     scale.hidden = !app.falseColours && !shared.isolines.value && app.layer !== 'error';
     for (const [input, value] of [[low, app.exposure.range[0]], [high, app.exposure.range[1]]] as const) {
-      if (document.activeElement !== input) input.value = String(Number(value.toPrecision(3)));
+      if (!isOpen(input)) input.value = String(Number(value.toPrecision(3)));
     }
   });
   return section('view', 'View', true,
@@ -61,5 +71,6 @@ export function viewPanel(app: App): HTMLElement {
     scale,
     el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Layer'), layer),
     el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Exposure'), exposure),
-    automatic, isolines, edges, rays);
+    automatic, isolines, edges, rays,
+    el('div', { class: 'row' }, button('Look freely with the mouse', () => app.lookFreely(), { key: 'Y' })));
 }

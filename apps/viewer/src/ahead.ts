@@ -1,0 +1,70 @@
+// What this page has changed and the server has not said yet. It is shown at once, what the server says meanwhile of
+// earlier places of a drag does not pull it back, and it is taken back where the server refuses.
+
+/** Milliseconds after which a change is given up that the server never told: another page's came after it. */
+const PATIENCE = 3000;
+
+/** Relative difference of numbers that are the same: the server keeps some in single precision. */
+const SAME = 1e-5;
+
+export class Ahead<T extends { id: number }> {
+  /** As the server said last. */
+  private said = new Map<number, T>();
+  private own = new Map<number, { change: Partial<T>; since: number }>();
+
+  /** Things as they are shown, and what shows one. */
+  constructor(private shown: Map<number, T>, private show: (thing: T) => void) {}
+
+  /** The server says how a thing is. */
+  hear(thing: T): void {
+    this.said.set(thing.id, thing);
+    const own = this.own.get(thing.id);
+    if (own && agrees(thing, own.change)) this.own.delete(thing.id);
+    this.put(thing.id);
+  }
+
+  /** This page has changed one. */
+  change(id: number, change: Partial<T>): void {
+    this.own.set(id, { change: { ...this.own.get(id)?.change, ...change }, since: performance.now() });
+    this.put(id);
+  }
+
+  /** From now on things are as the server says. */
+  forget(): void {
+    this.own.clear();
+  }
+
+  /** What was changed here and not confirmed is as before. */
+  takeBack(): void {
+    const ids = [...this.own.keys()];
+    this.own.clear();
+    for (const id of ids) this.put(id);
+  }
+
+  /** Takes back what nobody confirmed for long. */
+  expire(): void {
+    for (const [id, { since }] of this.own) {
+      if (performance.now() - since < PATIENCE) continue;
+      this.own.delete(id);
+      this.put(id);
+    }
+  }
+
+  private put(id: number): void {
+    const said = this.said.get(id);
+    if (!said) return;
+    const thing = { ...said, ...this.own.get(id)?.change };
+    this.shown.set(id, thing);
+    this.show(thing);
+  }
+}
+
+function agrees<T>(thing: T, change: Partial<T>): boolean {
+  return Object.entries(change).every(([name, value]) => isSame(thing[name as keyof T], value));
+}
+
+function isSame(a: unknown, b: unknown): boolean {
+  if (Array.isArray(a) && Array.isArray(b)) return a.length === b.length && a.every((x, i) => isSame(x, b[i]));
+  if (typeof a === 'number' && typeof b === 'number') return Math.abs(a - b) <= SAME * Math.max(1, Math.abs(a), Math.abs(b));
+  return a === b;
+}
