@@ -195,9 +195,10 @@ export class App {
     this.tellSoon('objects');
     if (!object || !surface) return;
     surface.visible = !object.deleted;
-    surface.material.uniforms.tint.value.fromArray(object.tint);
-    surface.material.uniforms.emission.value.fromArray(object.emission);
-    surface.dress(object.texture ? this.texture(object.texture) : null);
+    this.stage.dress(surface, {
+      tint: object.tint, emission: object.emission, transmittance: object.transmittance,
+      texture: object.texture ? this.texture(object.texture) : null,
+    });
     surface.matrix.fromArray(object.matrix);
     this.stage.moved(surface);
     this.followed(surface);
@@ -258,9 +259,8 @@ export class App {
 
   private shine(frame: LightFrame): void {
     const surface = this.stage.surfaces.get(frame.object);
-    surface?.shine(frame.first, frame.values);
+    if (surface) this.stage.shine(surface, frame.first, frame.values);
     this.exposure.lit();
-    this.stage.change();
   }
 
   /** What depends on light is asked again while light changes. */
@@ -556,7 +556,7 @@ export class App {
     if (JSON.stringify(layer) === JSON.stringify(this.layer)) return;
     this.layer = layer;
     // Light of the last layer would be taken for that of this one.
-    for (const surface of this.stage.surfaces.values()) surface.shine(0, new Uint16Array(surface.light.array.length));
+    for (const surface of this.stage.surfaces.values()) this.stage.shine(surface, 0, new Uint16Array(surface.light.array.length));
     shared.emissionShown.value = layer === 'total' || layer === 'direct' ? 1 : 0;
     this.connection.look(layer);
     this.paintMode();

@@ -4,8 +4,9 @@ import {
   Quaternion, Ray, RepeatWrapping, RGBAFormat, Scene, ShaderMaterial, type Side, SphereGeometry, Vector2, Vector3, WebGLRenderer,
   WebGLRenderTarget,
 } from 'three';
+import { Batches } from './batch';
 import { Outline } from './outline';
-import { DISPLAY, Mode, shared, type Surface } from './surface';
+import { DISPLAY, type Look, Mode, shared, type Surface } from './surface';
 import type { CameraPlace, SceneNotice } from './wire';
 
 /** The colour of what is marked. */
@@ -52,6 +53,7 @@ export class Stage {
   readonly root = new Group();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   readonly surfaces = new Map<number, Surface>();
+  private batches = new Batches(this.root);
   /** What is drawn over the scene and is no part of it. */
   readonly overlay = new Group();
   /** Things that stand in the overlay but not in the scene's axes. */
@@ -159,15 +161,31 @@ export class Stage {
     const old = this.surfaces.get(object);
     if (!old) return;
     this.root.remove(old);
+    this.batches.remove(old);
     old.dispose();
     this.surfaces.delete(object);
     this.boxes.delete(object);
     this.change();
   }
 
-  /** A surface is elsewhere. */
+  /** A surface looks like this from now on. */
+  dress(surface: Surface, look: Look): void {
+    surface.look = look;
+    this.batches.put(surface);
+    this.change();
+  }
+
+  /** Light has come to vertices of a surface. */
+  shine(surface: Surface, first: number, values: Uint16Array): void {
+    (surface.light.array as Uint16Array).set(values, 3 * first);
+    this.batches.shine(surface, first, values.length / 3);
+    this.change();
+  }
+
+  /** A surface is elsewhere, or there no longer. */
   moved(surface: Surface): void {
     surface.updateMatrixWorld(true);
+    this.batches.place(surface);
     surface.geometry.boundingBox ?? surface.geometry.computeBoundingBox();
     this.boxes.set(surface.object, surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld));
     this.change();
@@ -185,6 +203,7 @@ export class Stage {
     this.dirty = false;
     this.pace(now - this.lastFrame);
     this.lastFrame = now;
+    this.batches.settle();
     this.outline.prepare(this.renderer, this.scene, this.camera);
     this.renderer.render(this.scene, this.camera);
     this.frames += 1;
@@ -205,6 +224,7 @@ export class Stage {
 
   /** Draws now, whatever has changed, for who counts frames or reads pixels. */
   drawNow(): void {
+    this.batches.settle();
     this.outline.prepare(this.renderer, this.scene, this.camera);
     this.renderer.render(this.scene, this.camera);
     this.frames += 1;
@@ -293,6 +313,7 @@ export class Stage {
   async metering(): Promise<Metered | null> {
     if (this.isMetering) return null;
     this.isMetering = true;
+    this.batches.settle();
     const mode = shared.mode.value;
     const isolines = shared.isolines.value;
     shared.mode.value = Mode.Meter;

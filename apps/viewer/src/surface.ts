@@ -1,6 +1,6 @@
 // A surface as the eye sees it, or as a meter does: light at vertices times reflectance at pixels.
 import {
-  BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, GLSL3, Mesh, ShaderMaterial, Texture, Vector3,
+  BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, Mesh, MeshBasicMaterial, type Texture, Vector3,
   type IUniform,
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
@@ -15,7 +15,7 @@ export const UNIT = 16;
 export enum Mode { Eye, Lux, Meter }
 
 /** The curve of crates/scene/src/display.rs, the colours of a scale, and lines of equal illuminance. */
-const DISPLAY = /* glsl */ `
+export const DISPLAY = /* glsl */ `
   const vec3 LUMINANCE = vec3(${WEIGHTS.join(', ')});
   const float KNEE = 0.5;
   const float WHITE = 8.0;
@@ -48,27 +48,44 @@ const DISPLAY = /* glsl */ `
   }
 `;
 
-const VERTEX = /* glsl */ `
+export const VERTEX = /* glsl */ `
+  #include <batching_pars_vertex>
   in vec3 light;
+  in vec3 paint;
+  uniform highp sampler2D looks;
   out vec3 vLight;
+  out vec3 reflected;
   out vec2 vUv;
+  flat out vec3 emission;
+  #ifdef SHEET
+    in vec3 through;
+    out vec3 vThrough;
+  #endif
   void main() {
-    vLight = light * ${UNIT.toFixed(1)};
-    #ifdef TEXTURED
-      vUv = uv;
+    #include <batching_vertex>
+    int which = int(getIndirectIndex(gl_DrawID));
+    reflected = paint * texelFetch(looks, ivec2(0, which), 0).rgb;
+    emission = texelFetch(looks, ivec2(1, which), 0).rgb;
+    #ifdef SHEET
+      vThrough = through * ${UNIT.toFixed(1)} * texelFetch(looks, ivec2(2, which), 0).rgb;
     #endif
-    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+    vLight = light * ${UNIT.toFixed(1)};
+    vUv = uv;
+    gl_Position = projectionMatrix * modelViewMatrix * batchingMatrix * vec4(position, 1.0);
   }
 `;
 
-const FRAGMENT = /* glsl */ `
+export const FRAGMENT = /* glsl */ `
   precision highp float;
   in vec3 vLight;
   in vec2 vUv;
   uniform int mode;
   uniform float exposure;
-  uniform vec3 tint;
-  uniform vec3 emission;
+  in vec3 reflected;
+  flat in vec3 emission;
+  #ifdef SHEET
+    in vec3 vThrough;
+  #endif
   uniform float emissionShown;
   uniform sampler2D map;
   uniform vec2 range;
@@ -98,12 +115,16 @@ const FRAGMENT = /* glsl */ `
   }
 
   void main() {
-    vec3 reflectance = tint;
+    vec3 reflectance = reflected;
     #ifdef TEXTURED
       reflectance *= texture(map, vUv).rgb;
     #endif
     float lux = dot(vLight, LUMINANCE);
     vec3 luminance = min(reflectance, 0.99) * vLight * 0.31830988618 + emission * emissionShown;
+    #ifdef SHEET
+      // What shines on the other side comes through.
+      luminance += vThrough * 0.31830988618;
+    #endif
     if (mode == ${Mode.Meter}) {
       outColour = vec4(dot(luminance, LUMINANCE), lux, 0.0, 1.0);
       return;
@@ -126,51 +147,59 @@ export const shared = {
   isolines: { value: false },
 } satisfies Record<string, IUniform>;
 
-/** An object on the stage. */
-export class Surface extends Mesh<BufferGeometry, ShaderMaterial> {
+/** How a surface looks, apart from its light. */
+export interface Look {
+  tint: readonly number[];
+  /** cd/m². */
+  emission: readonly number[];
+  /** What passes through to the other side. */
+  transmittance: readonly number[];
+  texture: Texture | null;
+}
+
+/** What rays take the side from; the stage draws surfaces together, with a material of their own. */
+const PLAIN = new MeshBasicMaterial({ side: FrontSide });
+
+/** An object on the stage. By itself only its outline is drawn. */
+export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
   readonly light: Float16BufferAttribute;
+  look: Look = { tint: [1, 1, 1], emission: [0, 0, 0], transmittance: [0, 0, 0], texture: null };
+  /** For each vertex that on the other side of a sheet. */
+  private others: Uint32Array | null = null;
   /** Its tree of boxes, once a ray needed it. */
   private boxes: MeshBVH | null = null;
 
   constructor(readonly object: number, frame: MeshFrame) {
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(frame.positions, 3));
-    if (frame.uvs) geometry.setAttribute('uv', new BufferAttribute(frame.uvs, 2));
+    geometry.setAttribute('uv', new BufferAttribute(frame.uvs ?? new Float32Array((2 * frame.positions.length) / 3), 2));
+    geometry.setAttribute('paint', new BufferAttribute(frame.colours ?? new Float32Array(frame.positions.length).fill(1), 3));
     geometry.setIndex(new BufferAttribute(frame.indices, 1));
     const light = new Float16BufferAttribute(new Uint16Array(frame.positions.length), 3);
     geometry.setAttribute('light', light);
-    const material = new ShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: VERTEX,
-      fragmentShader: FRAGMENT,
-      side: FrontSide,
-      defines: {},
-      uniforms: {
-        ...shared,
-        tint: { value: new Vector3(1, 1, 1) },
-        emission: { value: new Vector3() },
-        map: { value: null },
-      },
-    });
-    super(geometry, material);
+    super(geometry, PLAIN);
     this.light = light;
     this.matrixAutoUpdate = false;
+    this.layers.disableAll();
   }
 
-  /** Light has come. Two bytes a number, and only what changed goes to the graphics memory. */
-  shine(first: number, values: Uint16Array): void {
-    (this.light.array as Uint16Array).set(values, 3 * first);
-    this.light.addUpdateRange(3 * first, values.length);
-    this.light.needsUpdate = true;
+  /** Whether light passes through. */
+  get isSheet(): boolean {
+    return this.look.transmittance.some((tau) => tau > 0);
   }
 
-  /** A picture, or none. */
-  dress(texture: Texture | null): void {
-    const had = 'TEXTURED' in this.material.defines;
-    this.material.uniforms.map.value = texture;
-    if (texture) this.material.defines.TEXTURED = '';
-    else delete this.material.defines.TEXTURED;
-    if (had !== (texture !== null)) this.material.needsUpdate = true;
+  /** For each vertex that on the other side: elements of backs follow those of the fronts, with corners 1 and 2 exchanged. */
+  get otherSide(): Uint32Array {
+    if (this.others) return this.others;
+    const index = this.geometry.index!.array;
+    this.others = Uint32Array.from({ length: this.light.count }, (_, vertex) => vertex);
+    const half = index.length / 2;
+    for (let corner = 0; corner < half; corner += 1) {
+      const [front, back] = [index[corner], index[half + corner - (corner % 3) + [0, 2, 1][corner % 3]]];
+      this.others[front] = back;
+      this.others[back] = front;
+    }
+    return this.others;
   }
 
   /** Whether its tree of boxes is there. */
@@ -186,8 +215,6 @@ export class Surface extends Mesh<BufferGeometry, ShaderMaterial> {
 
   dispose(): void {
     this.geometry.dispose();
-    this.material.dispose();
   }
 }
 
-export { DISPLAY };

@@ -41,6 +41,8 @@ export interface ObjectNotice {
   reflectance: [number, number, number];
   /** Reflectance; with a picture, what that is multiplied with. */
   tint: [number, number, number];
+  /** What passes through to the other side, of light that falls on it. */
+  transmittance: [number, number, number];
   texture: TextureUse | null;
   /** cd/m². */
   emission: [number, number, number];
@@ -143,6 +145,8 @@ export interface MeshFrame {
   object: number;
   positions: Float32Array;
   uvs: Float32Array | null;
+  /** Colours that the author gave to vertices. */
+  colours: Float32Array | null;
   indices: Uint32Array;
 }
 
@@ -156,6 +160,7 @@ export interface LightFrame {
 const MESH = 1;
 const LIGHT = 2;
 const HAS_UVS = 1;
+const HAS_COLOURS = 2;
 
 function readMesh(buffer: ArrayBuffer): MeshFrame {
   const [, object, vertices, triangles, flags] = new Uint32Array(buffer, 0, 5);
@@ -167,7 +172,8 @@ function readMesh(buffer: ArrayBuffer): MeshFrame {
   };
   const positions = floats(3 * vertices);
   const uvs = flags & HAS_UVS ? floats(2 * vertices) : null;
-  return { object, positions, uvs, indices: new Uint32Array(buffer, at, 3 * triangles) };
+  const colours = flags & HAS_COLOURS ? floats(3 * vertices) : null;
+  return { object, positions, uvs, colours, indices: new Uint32Array(buffer, at, 3 * triangles) };
 }
 
 function* readLight(buffer: ArrayBuffer): Generator<LightFrame> {

@@ -355,7 +355,7 @@ impl Solver {
         self.session.update_model(&mut self.model);
         for (index, object) in self.model.objects.iter().enumerate() {
             if index >= known {
-                self.board.post(Subject::Mesh(object.id.0), Notice::Binary(wire::mesh(object)));
+                self.board.post(Subject::Mesh(object.id.0), Notice::Binary(wire::mesh(object, self.session.scene())));
                 self.changed.insert(object.id);
             }
             self.say(Subject::Object(object.id.0), wire::object(object, self.session.scene()));

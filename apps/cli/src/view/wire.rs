@@ -1,7 +1,8 @@
 //! What page and server say to each other. JSON in both directions; triangles and light go out as binary frames:
 //!
 //! - triangles: `1, object, vertices, triangles, flags` as 32-bit words, then positions (three floats a vertex), texture
-//!   coordinates (two, where flag 1 is set), indices (three words a triangle);
+//!   coordinates (two, where flag 1 is set), colours of vertices (three, where flag 2 is set), indices (three words a
+//!   triangle);
 //! - light: `2, epoch`, then runs of `object, first, count` and three half floats for each of `count` vertices, in units of
 //!   16 lx, each run padded to whole words. The epoch is that of the page's last choice of a layer.
 //!
@@ -9,9 +10,10 @@
 
 use super::board::{CHUNK, LightChunk};
 use axum::body::Bytes;
+use glam::{DVec2, DVec3};
 use half::f16;
 use radiosity::session::{Edit, Layer, LightId, ModelLight, ModelObject, ObjectId};
-use radiosity::{Bands, Scene, Texture, TextureRef, Wrap};
+use radiosity::{Bands, Scene, Surface, Texture, TextureRef, Wrap};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 
@@ -24,6 +26,7 @@ const UNIT: f32 = 16.0;
 const MESH: u32 = 1;
 const LIGHT: u32 = 2;
 const HAS_UVS: u32 = 1;
+const HAS_COLOURS: u32 = 2;
 
 /// A place to look from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,6 +100,8 @@ pub enum Say<'a> {
         matrix: [f64; 16],
         reflectance: Bands,
         tint: Bands,
+        /// What passes through to the other side.
+        transmittance: Bands,
         texture: Option<TextureUse>,
         /// Luminance, cd/m².
         emission: Bands,
@@ -217,7 +222,10 @@ pub fn object(object: &ModelObject, scene: &Scene) -> String {
         of_scene.and_then(|material| material.base_color_texture.as_ref()).filter(|_| object.texture.is_some());
     // Metal's share of the base colour is no diffuse reflectance.
     let diffuse = of_scene.map_or(1.0, |material| 1.0 - material.metallic);
-    let tint = if texture.is_some() { object.tint.map(|t| t * diffuse) } else { object.reflectance };
+    let is_varied = texture.is_some() || !scene.colors.is_empty();
+    // What is black in the file has no pattern to keep under a new coat.
+    let pattern = |band: usize| is_varied && object.tint[band] > 0.0;
+    let tint = std::array::from_fn(|b| if pattern(b) { object.tint[b] * diffuse } else { object.reflectance[b] });
     Say::Object {
         id: object.id,
         name: &object.name,
@@ -225,12 +233,30 @@ pub fn object(object: &ModelObject, scene: &Scene) -> String {
         matrix: object.matrix,
         reflectance: object.reflectance,
         tint,
+        transmittance: transmittance(object, scene),
         texture: texture.map(TextureUse::new),
         emission: object.emission.map(|exitance| exitance / PI),
         deleted: object.deleted,
         movable: object.movable,
     }
     .text()
+}
+
+/// Triangles at whose middle the transmittance of an object is looked up, at most: a picture may vary it.
+const LOOKS: usize = 64;
+
+/// What passes through an object, on average.
+fn transmittance(object: &ModelObject, scene: &Scene) -> Bands {
+    let sheet = |t: &&u32| scene.material(**t as usize).transmits();
+    let every = object.triangle_of.len().div_ceil(LOOKS).max(1);
+    let looks: Vec<Bands> = object
+        .triangle_of
+        .iter()
+        .step_by(every)
+        .filter(sheet)
+        .map(|&t| scene.transmittance(Surface { triangle: t as usize, uv: DVec2::splat(1.0 / 3.0) }))
+        .collect();
+    std::array::from_fn(|band| looks.iter().map(|tau| tau[band]).sum::<f32>() / looks.len().max(1) as f32)
 }
 
 /// A light.
@@ -276,12 +302,40 @@ pub fn sky(scene: &Scene) -> Option<SkyPicture> {
     Some(SkyPicture { width, height, luminance })
 }
 
+/// Colours of the author's vertices at those that are drawn; empty where there are none.
+fn colours(object: &ModelObject, scene: &Scene) -> Vec<Bands> {
+    let white = [1.0; 4];
+    let is_white = |t: &u32| scene.triangles[*t as usize].iter().all(|&v| scene.colors[v as usize] == white);
+    if scene.colors.is_empty() || object.triangle_of.iter().all(is_white) {
+        return Vec::new();
+    }
+    let mut colours = vec![[1.0; 3]; object.positions.len()];
+    for (corners, &t) in object.indices.chunks_exact(3).zip(&object.triangle_of) {
+        let of = scene.triangles[t as usize].map(|v| v as usize);
+        let [a, b, c] = of.map(|v| scene.positions[v]);
+        let normal = (b - a).cross(c - a);
+        let scale = 1.0 / normal.length_squared().max(f64::MIN_POSITIVE);
+        for &corner in corners {
+            let p = DVec3::from(object.positions[corner as usize].map(f64::from)) - a;
+            let (v, w) = (p.cross(c - a).dot(normal) * scale, (b - a).cross(p).dot(normal) * scale);
+            let weights = [1.0 - v - w, v, w].map(|weight| weight as f32);
+            colours[corner as usize] = std::array::from_fn(|band| {
+                (0..3).map(|k| weights[k] * scene.colors[of[k]][band]).sum::<f32>().max(0.0)
+            });
+        }
+    }
+    colours
+}
+
 /// The triangles of an object.
-pub fn mesh(object: &ModelObject) -> Bytes {
-    let flags = if object.uvs.is_empty() { 0 } else { HAS_UVS };
+pub fn mesh(object: &ModelObject, scene: &Scene) -> Bytes {
+    let colours = colours(object, scene);
+    let flag = |is: bool, flag: u32| if is { flag } else { 0 };
+    let flags = flag(!object.uvs.is_empty(), HAS_UVS) | flag(!colours.is_empty(), HAS_COLOURS);
     let (vertices, triangles) = (object.positions.len() as u32, (object.indices.len() / 3) as u32);
     let words = [MESH, object.id.0, vertices, triangles, flags].into_iter();
-    let floats = object.positions.iter().flatten().chain(object.uvs.iter().flatten()).map(|x| x.to_bits());
+    let floats = object.positions.iter().flatten().chain(object.uvs.iter().flatten());
+    let floats = floats.chain(colours.iter().flatten()).map(|x| x.to_bits());
     words.chain(floats).chain(object.indices.iter().copied()).flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
 }
 
