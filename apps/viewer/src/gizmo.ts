@@ -54,6 +54,11 @@ export class Gizmo {
     return this.controls.axis !== null;
   }
 
+  /** Where the handles are, in the world. */
+  where(): number[] {
+    return this.handle.position.toArray();
+  }
+
   /** Puts the handles to what is selected, unless they are held. */
   place(): void {
     if (this.isDragging) return;

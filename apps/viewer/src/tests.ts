@@ -2,26 +2,61 @@
 import { DataUtils, Vector3 } from 'three';
 import type { App } from './app';
 import { luminance } from './luminance';
-import { corners } from './stage';
+import { corners, type Hit } from './stage';
 import { UNIT } from './surface';
 
 export function tests(app: App) {
-  /** Illuminance at a point of a surface, lx: interpolated as it is drawn. `normal` says on which side. */
+  /** A vertex attribute at a point of a surface, interpolated as it is drawn. */
+  const interpolated = ({ surface, triangle, uv }: Hit, at: (vertex: number, band: number) => number): number[] => {
+    const index = surface.geometry.index!;
+    const weights = [1 - uv[0] - uv[1], ...uv];
+    return [0, 1, 2].map((band) => weights.reduce((sum, weight, k) => sum + weight * at(index.getX(3 * triangle + k), band), 0));
+  };
+  const light = (hit: Hit, side = (vertex: number) => vertex) => {
+    const values = hit.surface.light.array as Uint16Array;
+    return interpolated(hit, (vertex, band) => UNIT * DataUtils.fromHalfFloat(values[3 * side(vertex) + band]));
+  };
+  /** Illuminance at a point of a surface, lx. `normal` says on which side. */
   const lux = ([x, y, z, nx, ny, nz]: number[]): number | null => {
     const point = app.stage.root.localToWorld(new Vector3(x, y, z));
     const normal = new Vector3(nx, ny, nz).transformDirection(app.stage.root.matrixWorld);
     const size = app.stage.bounds.getSize(new Vector3()).length();
     const hit = app.stage.cast(point.clone().addScaledVector(normal, 2e-4 * size), normal.clone().negate(), 1e-3 * size);
-    if (!hit) return null;
-    const values = hit.surface.light.array as Uint16Array;
-    const index = hit.surface.geometry.index!;
-    const weights = [1 - hit.uv[0] - hit.uv[1], ...hit.uv];
-    return luminance([0, 1, 2].map((band) => UNIT * weights.reduce((mean, weight, k) =>
-      mean + weight * DataUtils.fromHalfFloat(values[3 * index.getX(3 * hit.triangle + k) + band]), 0)));
+    return hit && luminance(light(hit));
   };
   return {
     app,
     lux,
+    /** The picture that is drawn now, without what is drawn over it, at places of the canvas (shares of its sides, from
+     *  above left); and what is known there of the light that it should show. None where there is nothing, or an edge. */
+    seen(places: [number, number][]) {
+      const { stage } = app;
+      stage.overlay.visible = stage.tools.visible = false;
+      stage.drawNow();
+      stage.overlay.visible = stage.tools.visible = true;
+      stage.change();
+      const gl = stage.renderer.getContext();
+      const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+      const pixels = new Uint8Array(4 * width * height);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return places.map(([x, y]) => {
+        const [column, row] = [Math.floor(x * width), Math.floor((1 - y) * height)];
+        const pick = (i: number, j: number) => stage.pick((2 * (column + i + 0.5)) / width - 1, (2 * (row + j + 0.5)) / height - 1);
+        const hit = pick(0, 0);
+        const around = [[-2, -2], [-2, 2], [2, -2], [2, 2]].map(([i, j]) => pick(i, j));
+        if (!hit || around.some((other) => other?.surface !== hit.surface || other.normal.dot(hit.normal) < 0.999)) return null;
+        const { tint, emission, transmittance, texture } = hit.surface.look;
+        const paint = hit.surface.geometry.attributes.paint.array;
+        return {
+          name: app.objects.get(hit.surface.object)!.name,
+          pixel: [...pixels.subarray(4 * (row * width + column), 4 * (row * width + column) + 3)],
+          irradiance: light(hit),
+          behind: hit.surface.isSheet ? light(hit, (vertex) => hit.surface.otherSide[vertex]) : [0, 0, 0],
+          reflectance: interpolated(hit, (vertex, band) => paint[3 * vertex + band] * tint[band]),
+          transmittance, emission, hasPicture: texture !== null,
+        };
+      });
+    },
     /** Points spread over the surfaces by area, x, y, z and the normal, in the scene's axes. */
     points(count: number): number[][] {
       const found: { area: number; make(): number[] }[] = [];
@@ -54,6 +89,8 @@ export function tests(app: App) {
       objects: [...app.objects.values()],
       lights: [...app.lights.values()],
       selected: app.selected,
+      selectedLight: app.selectedLight,
+      isDragging: app.gizmo.isDragging,
       undo: app.undoable,
       redo: app.redoable,
       bookmarks: app.bookmarks,
@@ -61,7 +98,11 @@ export function tests(app: App) {
       mode: app.navigator.mode,
       frames: app.stage.frames,
       received: app.connection.received,
-      grid: app.grid && { least: app.grid.least, mean: app.grid.mean, largest: app.grid.largest, count: app.grid.points.length },
+      grid: app.grid && {
+        least: app.grid.least, mean: app.grid.mean, largest: app.grid.largest, count: app.grid.points.length, cell: app.grid.cell, size: app.grid.size,
+        first: app.grid.points[0].point.toArray(),
+      },
+      layer: app.layer,
       probe: app.probed?.answer ?? null,
       exposure: app.exposure.value,
     }),

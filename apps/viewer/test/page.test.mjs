@@ -1,13 +1,8 @@
 // The page in a browser, against the program.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { browser, caughtUp, compared, done, picture, state, view } from './program.mjs';
+import { browser, caughtUp, compared, done, luxOf, NEAR, picture, restored, SMALL, state, stuck, view } from './program.mjs';
 
-/** Farthest that light on the page may be from a batch solve that was audited to 3 %: elements of this size blur the edges of
- *  shadows. Measured: 0.025. An edit that is missed makes it 0.2 and more. */
-const NEAR = 0.05;
-
-const SMALL = ['--elements', '6000', '--rays', '64'];
 let program;
 let pages;
 
@@ -20,64 +15,92 @@ after(async () => {
   assert.equal(await program.end(), 0, 'Ctrl-C ends it with 0');
 });
 
-/** Undoes everything, so that tests do not depend on each other. */
-async function restored(page) {
-  for (;;) {
-    const { undo, status } = await state(page);
-    if (undo === null) break;
-    await page.evaluate(() => window.radiosity.app.undo());
-    await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, status.edits);
-    await page.waitForTimeout(50);
-  }
-  await done(page);
-}
+/** Seconds to the whole scene, from the beginning of the page: the least of three, since others use this machine too. People are
+ *  promised one, with graphics hardware; here the processor draws, and as much again is for that. Measured: OPENED. */
+const OPENED = 2;
 
 test('opens at once, and light comes that a batch solve agrees with', async () => {
   const page = await pages.open(program.url);
-  const opened = (await state(page)).opened / 1000;
-  // A second is what people are promised on their machines; here graphics are drawn by the processor, which is busy.
-  assert.ok(opened < 10, `${opened} s`);
   await done(page);
+  const times = [];
+  for (let i = 0; i < 3; i += 1) {
+    const other = await pages.open(program.url);
+    times.push((await state(other)).opened / 1000);
+    await other.context().close();
+  }
+  assert.ok(Math.min(...times) < OPENED, `${times} s`);
   const off = await compared(page);
   assert.ok(off < NEAR, `${off}`);
-  await page.waitForTimeout(1200);
   await picture(page, 'cornell');
-  console.log(`opened after ${opened.toFixed(2)} s; ${(100 * off).toFixed(1)} % from a batch solve`);
+  console.log(`opened after ${times.map((time) => time.toFixed(2)).join(', ')} s; ${(100 * off).toFixed(1)} % from a batch solve`);
   const origin = new URL(program.url).host;
   assert.deepEqual(page.asked.filter((url) => !/^(data|blob):/.test(url) && new URL(url).host !== origin), [], 'asks nobody else');
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });
 
-test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a batch solve has it', async () => {
+test('a page that takes nothing holds back neither the solver nor another page', async () => {
+  const [page, slow] = await Promise.all([pages.open(program.url), pages.open(program.url)]);
+  await Promise.all([done(page), done(slow)]);
+  /** Milliseconds until all light of a series of changes is on the page. */
+  const series = async (count) => {
+    const { edits } = (await state(page)).status;
+    const begin = performance.now();
+    for (let i = 1; i <= count; i += 1) {
+      await page.evaluate((dimming) => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming }), 0.2 + 0.01 * i);
+      await page.waitForFunction((edits) => window.radiosity.state().status.edits >= edits, edits + i);
+    }
+    await done(page, edits + count);
+    return performance.now() - begin;
+  };
+  const alone = await series(30);
+  // One stands still as in a debugger; of the others nobody reads what they are sent.
+  const still = await slow.context().newCDPSession(slow);
+  await still.send('Debugger.enable');
+  await still.send('Debugger.pause');
+  const others = await Promise.all(Array.from({ length: 4 }, () => stuck(program.url)));
+  const beside = await series(30);
+  console.log(`30 changes: ${alone.toFixed(0)} ms, beside five pages that take nothing ${beside.toFixed(0)} ms`);
+  // What they are owed has to be made, and the machine is not idle; waiting for one of them would take half a minute.
+  assert.ok(beside < 2 * alone + 2000, `${beside} ms instead of ${alone} ms`);
+  others.forEach((other) => other.end());
+  await still.send('Debugger.resume');
+  await still.send('Debugger.disable');
+  await done(slow, (await state(page)).status.edits);
+  assert.deepEqual(await luxOf(slow, 60), await luxOf(page, 60), 'and it has caught up');
+  await restored(page);
+  await Promise.all([page.context().close(), slow.context().close()]);
+});
+
+test('a measuring grid stays where it was laid, as fine as the standard asks', async () => {
   const page = await pages.open(program.url);
   await done(page);
-  const { edits } = (await state(page)).status;
-  const { objects, lights } = await state(page);
-  const block = objects.find((object) => object.name === 'short block');
-  const wall = objects.find((object) => object.name === 'left');
-  await page.evaluate(([block, wall, light]) => {
+  const laid = await page.evaluate(() => {
     const { app } = window.radiosity;
-    app.select(block);
-    app.nudge(app.stage.camera.position.clone().set(0.1, 0, -0.05), 0.4);
-    app.paint(wall, [0.1, 0.2, 0.6]);
-    app.setLight(app.lights.get(light), { dimming: 0.5 });
-  }, [block.id, wall.id, lights[0].id]);
-  await done(page, edits + 3);
-  const off = await compared(page);
-  assert.ok(off < NEAR, `${off}`);
-  await page.waitForTimeout(1200);
-  await picture(page, 'edited');
-  const { latency } = (await state(page)).status;
-  console.log(`${(100 * off).toFixed(1)} % from a batch solve of the edited scene; the last change took ${latency.toFixed(0)} ms`);
-
-  const before = await page.evaluate(() => window.radiosity.points(50).map((point) => window.radiosity.lux(point)));
-  await page.evaluate(() => window.radiosity.app.undo());
-  await done(page, edits + 4);
-  await page.evaluate(() => window.radiosity.app.redo());
-  await done(page, edits + 5);
-  const again = await page.evaluate(() => window.radiosity.points(50).map((point) => window.radiosity.lux(point)));
-  assert.deepEqual(again, before, 'undone and done again, light is the same to the last bit');
+    app.pick(0, -0.9);
+    app.measure();
+    return window.radiosity.state().grid;
+  });
+  // EN 12464-1: p = 0.2 · 5^lg d, d the longer side of what is no strip.
+  const most = 0.2 * 5 ** Math.log10(Math.max(...laid.size));
+  assert.ok(Math.max(...laid.cell) <= most * (1 + 1e-9) && Math.max(...laid.cell) > most / 2, `${laid.cell} m, at most ${most} m`);
+  assert.equal(laid.count, laid.size.reduce((count, side, k) => count * Math.round(side / laid.cell[k]), 1));
+  const { edits } = (await state(page)).status;
+  await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.pick(0.3, 0.9);
+    app.setLight(app.lights.get(0), { dimming: 0.5 });
+  });
+  await done(page, edits + 1);
+  await page.waitForFunction((mean) => Math.abs(window.radiosity.state().grid.mean / mean - 0.5) < 0.01, laid.mean);
+  const { grid } = await state(page);
+  assert.deepEqual([grid.first, grid.size], [laid.first, laid.size], 'it is where it was, and what it reads follows');
+  await page.evaluate(() => {
+    document.querySelector('#grid').open = true;
+    window.radiosity.app.showLayer('direct');
+  });
+  await page.waitForFunction((mean) => window.radiosity.state().grid.mean > 0 && window.radiosity.state().grid.mean < 0.98 * mean, grid.mean);
+  assert.match(await page.locator('#grid .warning').textContent(), /Direct light/);
   await restored(page);
   assert.deepEqual(page.faults, []);
   await page.context().close();
@@ -151,72 +174,6 @@ test('without the token, and from elsewhere, there is no page', async () => {
   }), address);
   assert.equal(await refused(`ws://${url.host}/0123/socket`), true);
   assert.equal(await refused(`ws://localhost:${url.port}${url.pathname}socket`), true, 'another origin by its name');
-  await page.context().close();
-});
-
-test('everything is reached by keyboard alone', async () => {
-  const page = await pages.open(program.url);
-  await done(page);
-  const { camera, status } = await state(page);
-  await page.keyboard.down('w');
-  await page.waitForTimeout(400);
-  await page.keyboard.up('w');
-  await page.keyboard.down('ArrowRight');
-  await page.waitForTimeout(200);
-  await page.keyboard.up('ArrowRight');
-  assert.notDeepEqual((await state(page)).camera, camera, 'walks and turns');
-
-  // The first camera again: the cross is on the back wall or a block.
-  await page.keyboard.press('c');
-  await page.keyboard.press('Enter');
-  await page.waitForFunction(() => window.radiosity.state().probe !== null);
-  const { probe, selected } = await state(page);
-  assert.ok(probe.illuminance > 0 && selected !== null);
-  assert.ok(probe.lights.length > 0 && probe.surfaces.length > 0);
-  await page.keyboard.press('g');
-  assert.ok((await state(page)).grid.count > 4, 'a grid');
-  for (const key of ['F2', 'i', 'e', 't']) await page.keyboard.press(key);
-  await page.waitForTimeout(1500);
-  await picture(page, 'false-colours');
-  for (const key of ['F2', 'i', 'e', 't']) await page.keyboard.press(key);
-  await page.keyboard.press('b');
-  await page.waitForFunction(() => window.radiosity.state().bookmarks.length === 1);
-  await page.keyboard.press('h');
-  assert.equal(await page.locator('#help').isVisible(), true);
-  await picture(page, 'keys');
-  await page.keyboard.press('Escape');
-  assert.equal(await page.locator('#help').isVisible(), false);
-
-  // Tab leads through all controls and back; the lamp is switched off with the space bar.
-  const seen = new Set();
-  for (let i = 0; i < 80; i += 1) {
-    await page.keyboard.press('Tab');
-    const label = await page.evaluate(() => document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent);
-    if (seen.size > 5 && label === [...seen][0]) break;
-    seen.add(label);
-    if (/^light on$/i.test(label)) {
-      await page.keyboard.press('Space');
-      break;
-    }
-  }
-  await page.waitForFunction(() => window.radiosity.state().lights[0].dimming === 0, undefined, { timeout: 5000 });
-  await page.keyboard.press('Escape');
-  await page.keyboard.press('Control+z');
-  await page.waitForFunction(() => window.radiosity.state().lights[0].dimming === 1);
-
-  // A thing is duplicated, moved and deleted.
-  const { objects } = await state(page);
-  const block = objects.find((object) => object.name === 'short block');
-  await page.evaluate((id) => window.radiosity.app.select(id), block.id);
-  await page.keyboard.press('Control+d');
-  await page.waitForFunction((count) => window.radiosity.state().objects.length > count, objects.length);
-  await page.keyboard.press('k');
-  await page.keyboard.press('.');
-  await page.keyboard.press('Delete');
-  await page.waitForFunction((id) => window.radiosity.state().objects.find((object) => object.id === id).deleted, block.id);
-  assert.ok((await state(page)).status.edits > status.edits);
-  await restored(page);
-  assert.deepEqual(page.faults, []);
   await page.context().close();
 });
 

@@ -1,7 +1,10 @@
 // The program and pages that look at it, for tests. RADIOSITY and CHROMIUM say where the programs are, PAGE a page that was
 // just built, to be tried in place of the one that the program carries; screenshots go to out/viewer of the repository.
 import { spawn, spawnSync } from 'node:child_process';
+import { randomBytes } from 'node:crypto';
+import { once } from 'node:events';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { createInterface } from 'node:readline';
@@ -12,6 +15,13 @@ const root = join(dirname(fileURLToPath(import.meta.url)), '..', '..', '..');
 const radiosity = process.env.RADIOSITY ?? join(root, 'target', 'debug', 'radiosity');
 export const pictures = join(root, 'out', 'viewer');
 mkdirSync(pictures, { recursive: true });
+
+/** A scene that is done in a second: few elements, few rays. */
+export const SMALL = ['--elements', '6000', '--rays', '64'];
+
+/** Farthest that light on the page may be from a batch solve that was audited to 3 %: elements of this size blur the edges of
+ *  shadows. Measured: 0.025. An edit that is missed makes it 0.2 and more. */
+export const NEAR = 0.05;
 
 /** Starts `radiosity view`; gives the address, and the way to end it as Ctrl-C does, which gives the exit code. */
 export async function view(...options) {
@@ -87,6 +97,18 @@ export async function done(page, edits = 0) {
   await quiet(page);
 }
 
+/** Undoes everything, so that tests do not depend on each other. */
+export async function restored(page) {
+  for (;;) {
+    const { undo, status } = await state(page);
+    if (undo === null) break;
+    await page.evaluate(() => window.radiosity.app.undo());
+    await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, status.edits);
+    await page.waitForTimeout(50);
+  }
+  await done(page);
+}
+
 /** Waits until nothing has come for a while. */
 async function quiet(page) {
   let last = -1;
@@ -98,25 +120,35 @@ async function quiet(page) {
   }
 }
 
+/** The scene that a page would save. */
+export async function saved(page) {
+  const glb = await page.evaluate(async () => [...new Uint8Array(await (await fetch('scene.glb')).arrayBuffer())]);
+  return Buffer.from(glb);
+}
+
+/** A folder for what a test writes; it goes when the test is over. */
+export async function folder(use) {
+  const path = mkdtempSync(join(tmpdir(), 'radiosity-view-'));
+  try {
+    return await use(path);
+  } finally {
+    rmSync(path, { recursive: true });
+  }
+}
+
 /** Illuminance at points [x, y, z, nx, ny, nz] of the scene that a page would save, by `radiosity measure`, lx. */
 export async function measured(page, points) {
-  const folder = mkdtempSync(join(tmpdir(), 'radiosity-view-'));
-  try {
-    const glb = await page.evaluate(async () => {
-      const response = await fetch('scene.glb');
-      return [...new Uint8Array(await response.arrayBuffer())];
-    });
-    writeFileSync(join(folder, 'scene.glb'), Buffer.from(glb));
-    writeFileSync(join(folder, 'points.csv'), ['x,y,z,nx,ny,nz', ...points.map((point) => point.join(','))].join('\n'));
+  const glb = await saved(page);
+  return folder((path) => {
+    writeFileSync(join(path, 'scene.glb'), glb);
+    writeFileSync(join(path, 'points.csv'), ['x,y,z,nx,ny,nz', ...points.map((point) => point.join(','))].join('\n'));
     const run = spawnSync(radiosity, ['measure', 'scene.glb', '--points', 'points.csv', '--error', '3%', '-o', 'light.csv', '--quiet'],
-      { cwd: folder, encoding: 'utf8' });
+      { cwd: path, encoding: 'utf8' });
     if (run.status !== 0) throw new Error(`radiosity measure: ${run.stderr}`);
-    const [names, ...rows] = readFileSync(join(folder, 'light.csv'), 'utf8').trim().split('\n');
+    const [names, ...rows] = readFileSync(join(path, 'light.csv'), 'utf8').trim().split('\n');
     const column = names.split(',').indexOf('illuminance_lux');
     return rows.map((row) => Number(row.split(',')[column]));
-  } finally {
-    rmSync(folder, { recursive: true });
-  }
+  });
 }
 
 /** The relative L2 difference of two lists. */
@@ -136,5 +168,32 @@ export async function compared(page, count = 150) {
   return difference(pairs.map(([lux]) => lux), pairs.map(([, lux]) => lux));
 }
 
+/** A page that looks at all light and never reads what it is sent: `end` closes it. */
+export async function stuck(url) {
+  const { host, hostname, port, pathname, origin } = new URL(url);
+  const socket = connect(Number(port), hostname);
+  await once(socket, 'connect');
+  socket.write(`GET ${pathname}socket HTTP/1.1\r\nHost: ${host}\r\nOrigin: ${origin}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n` +
+    `Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: ${randomBytes(16).toString('base64')}\r\n\r\n`);
+  const [answer] = await once(socket, 'data');
+  if (!String(answer).startsWith('HTTP/1.1 101')) throw new Error(`no socket: ${answer}`);
+  socket.pause();
+  // A frame of text with a mask of zeros.
+  const text = Buffer.from(JSON.stringify({ kind: 'layer', layer: 'total', epoch: 1 }));
+  socket.write(Buffer.concat([Buffer.from([0x81, 0x80 | text.length, 0, 0, 0, 0]), text]));
+  socket.on('error', () => {});
+  return { end: () => socket.destroy(), read: () => socket.bytesRead };
+}
+
 /** A picture for people. */
 export const picture = (page, name) => page.screenshot({ path: join(pictures, `${name}.png`) });
+
+/** Points of the surfaces, as many as asked or those given, and the illuminance that the page shows there. */
+export const luxOf = (page, asked) => page.evaluate((asked) => {
+  const { radiosity } = window;
+  const points = Array.isArray(asked) ? asked : radiosity.points(asked);
+  return { points, lux: points.map((point) => radiosity.lux(point) ?? 0) };
+}, asked);
+
+/** The picture at places of the canvas, and what is known of the light there. */
+export const pixelsOf = (page, places) => page.evaluate((places) => window.radiosity.seen(places), places);

@@ -1,0 +1,307 @@
+// Changes that people make on the page, and the light that follows.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { browser, compared, difference, done, folder, luxOf, NEAR, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
+import { shown } from './display.mjs';
+import { studio } from './studio.mjs';
+
+let program;
+let pages;
+
+before(async () => {
+  [program, pages] = await Promise.all([view(...SMALL), browser()]);
+});
+
+after(async () => {
+  await pages.close();
+  await program.end();
+});
+
+const named = async (page, name) => (await state(page)).objects.find((object) => object.name === name && !object.deleted);
+
+/** Where the handle is that moves what is selected along the world's x, in pixels of the page. */
+const handle = (page) => page.evaluate(() => {
+  const { app } = window.radiosity;
+  const { camera, canvas } = app.stage;
+  const spot = app.spot();
+  // As TransformControls scales its handles; 0.45 of that is on the shaft.
+  const size = spot.distanceTo(camera.position) * Math.min(1.9 * Math.tan((Math.PI * camera.fov) / 360), 7) * (0.8 / 4);
+  const at = app.stage.project(spot.clone().setX(spot.x + 0.45 * size));
+  const box = canvas.getBoundingClientRect();
+  return [box.left + at.x, box.top + at.y];
+});
+
+test('a thing is dragged, and light follows while it is and as a batch solve has it', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const block = await named(page, 'short block');
+  await page.evaluate((id) => window.radiosity.app.select(id), block.id);
+  await page.waitForTimeout(300);
+  const [x, y] = await handle(page);
+  const before = await luxOf(page, 120);
+  const { edits } = (await state(page)).status;
+  await page.mouse.move(x, y);
+  await page.waitForTimeout(100);
+  await page.mouse.down();
+  for (let step = 1; step <= 10; step += 1) {
+    await page.mouse.move(x - 6 * step, y);
+    await page.waitForTimeout(30);
+  }
+  assert.ok((await state(page)).isDragging, 'the handle is held');
+  // The button is still down: the server has been told, and its light is here.
+  await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, edits);
+  await page.waitForFunction(([points, before]) => {
+    const { radiosity } = window;
+    return points.filter((point, i) => Math.abs((radiosity.lux(point) ?? 0) - before[i]) > 0.05 * before[i]).length > 3;
+  }, [before.points, before.lux], { timeout: 10_000 });
+  assert.ok((await state(page)).isDragging, 'and still is');
+  const held = (await named(page, 'short block')).matrix;
+  await page.mouse.up();
+  await done(page, edits + 1);
+  const { matrix } = await named(page, 'short block');
+  assert.deepEqual(matrix, held, 'it lies where it was let go');
+  assert.ok(Math.abs(matrix[12]) > 0.03 && Math.abs(matrix[13]) + Math.abs(matrix[14]) < 1e-6, `moved along x alone: ${matrix}`);
+  const off = await compared(page);
+  console.log(`dragged by ${matrix[12].toFixed(2)} m: ${(100 * off).toFixed(1)} % from a batch solve`);
+  assert.ok(off < NEAR, `${off}`);
+  await picture(page, 'dragged');
+
+  // A gesture is one change, and the handles go back with the thing.
+  const there = await handle(page);
+  await page.keyboard.press('Control+z');
+  await page.waitForFunction((id) => window.radiosity.state().objects.find((object) => object.id === id).matrix[12] === 0, block.id);
+  await page.waitForTimeout(200);
+  const back = await page.evaluate(() => window.radiosity.app.gizmo.where().map((x) => x));
+  const spot = await page.evaluate(() => window.radiosity.app.spot().toArray());
+  back.forEach((value, k) => assert.ok(Math.abs(value - spot[k]) < 1e-6, `${back} ${spot}`));
+  assert.notDeepEqual(await handle(page), there);
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a batch solve has it', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const { edits } = (await state(page)).status;
+  const { lights } = await state(page);
+  const [block, wall] = [await named(page, 'short block'), await named(page, 'left')];
+  await page.evaluate(([block, wall, light]) => {
+    const { app } = window.radiosity;
+    app.select(block);
+    app.nudge(app.stage.camera.position.clone().set(0.1, 0, -0.05), 0.4);
+    app.select(null);
+    app.paint(wall, [0.1, 0.2, 0.6]);
+    app.setLight(app.lights.get(light), { dimming: 0.5 });
+    app.exposure.set(0);
+  }, [block.id, wall.id, lights[0].id]);
+  await done(page, edits + 3);
+  const off = await compared(page);
+  assert.ok(off < NEAR, `${off}`);
+  const { latency } = (await state(page)).status;
+  console.log(`${(100 * off).toFixed(1)} % from a batch solve of the edited scene; the last change took ${latency.toFixed(0)} ms`);
+
+  // The picture is the light that was read.
+  const places = Array.from({ length: 600 }, (_, i) => [((i % 30) + 0.5) / 30, (Math.floor(i / 30) + 0.5) / 20]);
+  const seen = await pixelsOf(page, places);
+  const known = seen.filter(Boolean);
+  assert.ok(known.length > 200, `${known.length} places of the picture`);
+  for (const place of known) {
+    const right = shown(place, 0);
+    place.pixel.forEach((byte, band) => assert.ok(Math.abs(byte - right[band]) <= 2, `${place.name}: ${place.pixel}, and by its light ${right}`));
+  }
+
+  // And the picture of who opens the edited scene afresh. It may be rounded as files are.
+  await folder(async (path) => {
+    writeFileSync(join(path, 'edited.glb'), await saved(page));
+    const again = await view(join(path, 'edited.glb'), ...SMALL);
+    const fresh = await pages.open(again.url);
+    await done(fresh);
+    const camera = await page.evaluate(() => window.radiosity.app.stage.place(''));
+    await fresh.evaluate((camera) => {
+      const { app } = window.radiosity;
+      app.look(camera);
+      app.exposure.set(0);
+    }, camera);
+    const other = await pixelsOf(fresh, places);
+    const pairs = seen.flatMap((place, i) => (place && other[i] ? [[place.pixel, other[i].pixel]] : []));
+    assert.ok(pairs.length > 0.95 * known.length, `${pairs.length} of ${known.length}`);
+    const apart = pairs.flatMap(([a, b]) => a.map((byte, band) => Math.abs(byte - b[band]))).sort((a, b) => a - b);
+    const [mean, most] = [apart.reduce((a, b) => a + b, 0) / apart.length, apart[Math.floor(0.99 * apart.length)]];
+    console.log(`pixels of the edited scene opened afresh: ${mean.toFixed(2)} of 255 apart in the mean, ${most} at most in 99 %`);
+    assert.ok(mean < 0.5 && most <= 3, `${mean} ${most}`);
+    await fresh.context().close();
+    await again.end();
+  });
+  await picture(page, 'edited');
+
+  const before = await luxOf(page, 50);
+  await page.evaluate(() => window.radiosity.app.undo());
+  await done(page, edits + 4);
+  await page.evaluate(() => window.radiosity.app.redo());
+  await done(page, edits + 5);
+  assert.deepEqual(await luxOf(page, 50), before, 'undone and done again, light is the same to the last bit');
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('what is changed before the light is there is in it', async () => {
+  const early = await view('--elements', '30000', '--rays', '256');
+  const page = await pages.open(early.url);
+  const block = await named(page, 'short block');
+  const { is_done } = await page.evaluate((id) => {
+    const { app } = window.radiosity;
+    app.select(id);
+    app.nudge(app.stage.camera.position.clone().set(0.05, 0, 0.02), -0.3);
+    app.setLight(app.lights.get(0), { dimming: 0.7 });
+    return { is_done: app.status?.is_done ?? false };
+  }, block.id);
+  assert.equal(is_done, false, 'light was still on its way');
+  await done(page, 2);
+  const off = await compared(page);
+  console.log(`changed before the end: ${(100 * off).toFixed(1)} % from a batch solve`);
+  assert.ok(off < NEAR, `${off}`);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+  await early.end();
+});
+
+test('a layer that is shown follows changes, and layers add up after them', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const { points } = await luxOf(page, 150);
+  const layer = async (layer) => {
+    await page.evaluate((layer) => window.radiosity.app.showLayer(layer), layer);
+    await page.waitForFunction((points) => points.some((point) => window.radiosity.lux(point) > 0), points.slice(0, 40));
+    await done(page);
+    return (await luxOf(page, points)).lux;
+  };
+  const { edits } = (await state(page)).status;
+  const direct = await layer('direct');
+  await page.evaluate(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming: 0.25 }));
+  await done(page, edits + 1);
+  const { lux: dimmed } = await luxOf(page, points);
+  assert.ok(difference(dimmed, direct.map((lux) => lux / 4)) < 1e-3, 'a quarter of the lamp, a quarter of its direct light');
+  await layer('indirect');
+  const wall = await named(page, 'left');
+  await page.evaluate((id) => window.radiosity.app.paint(id, [0.05, 0.05, 0.05]), wall.id);
+  await done(page, edits + 2);
+  const { lux: indirect } = await luxOf(page, points);
+  assert.equal((await state(page)).layer, 'indirect');
+  const [straight, total] = [await layer('direct'), await layer('total')];
+  const off = difference(straight.map((lux, i) => lux + indirect[i]), total);
+  assert.ok(off < 2e-3, `${off}`);
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('what is refused is taken back, and a copy is selected', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const block = await named(page, 'short block');
+  const ahead = await page.evaluate((id) => {
+    const { app } = window.radiosity;
+    app.select(id);
+    app.nudge(app.stage.camera.position.clone().set(1e6, 0, 0), 0);
+    return app.objects.get(id).matrix[12];
+  }, block.id);
+  assert.ok(ahead > 1e5, 'shown at once');
+  await page.waitForFunction(() => /Not changed/.test(window.radiosity.state().message));
+  assert.deepEqual((await named(page, 'short block')).matrix, block.matrix);
+  const [at, handles] = await page.evaluate(() => [window.radiosity.app.spot().toArray(), window.radiosity.app.gizmo.where()]);
+  at.forEach((value, k) => assert.ok(Math.abs(value - handles[k]) < 1e-6));
+  // Too bright is refused, too, and the slider goes back.
+  await page.evaluate(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming: 1e9 }));
+  await page.waitForFunction(() => window.radiosity.state().lights[0].dimming === 1);
+  assert.equal(await page.locator('.light input[type=number]').first().inputValue(), '100');
+
+  const { objects } = await state(page);
+  await page.evaluate(() => window.radiosity.app.duplicate());
+  await page.waitForFunction((count) => window.radiosity.state().objects.length > count, objects.length);
+  const copy = (await state(page)).objects.at(-1);
+  assert.equal((await state(page)).selected, copy.id);
+  assert.notEqual(copy.id, block.id);
+  await restored(page);
+  assert.equal((await state(page)).selected, null, 'what is gone is not selected');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('lamps without area, sheets and colours at vertices', async () => {
+  await folder(async (path) => {
+    writeFileSync(join(path, 'studio.gltf'), studio());
+    const lit = await view(join(path, 'studio.gltf'), ...SMALL);
+    const page = await pages.open(lit.url);
+    await done(page);
+    await page.evaluate(() => window.radiosity.app.exposure.set(-5));
+
+    // Each pixel is what reflects there, by the colours of vertices, and what comes through the sheet.
+    const places = Array.from({ length: 400 }, (_, i) => [((i % 20) + 0.5) / 20, (Math.floor(i / 20) + 0.5) / 20]);
+    const known = (await pixelsOf(page, places)).filter(Boolean);
+    const sheet = known.filter(({ name }) => name === 'sheet');
+    const floor = known.filter(({ name }) => name === 'floor');
+    assert.ok(sheet.length > 5 && floor.length > 20, `${sheet.length} ${floor.length}`);
+    for (const place of known) {
+      const right = shown(place, -5);
+      place.pixel.forEach((byte, band) => assert.ok(Math.abs(byte - right[band]) <= 2, `${place.name}: ${place.pixel}, and by its light ${right}`));
+    }
+    // The bulb is behind it: more light comes through than is thrown back.
+    const luminous = sheet.filter(({ behind, irradiance }) => behind[0] > 3 * irradiance[0]);
+    assert.ok(luminous.length > 5 && sheet[0].transmittance[0] > 0.2, JSON.stringify(sheet[0]));
+    const reds = floor.map(({ reflectance }) => reflectance[0]);
+    assert.ok(Math.min(...reds) < 0.25 && Math.max(...reds) > 0.55, 'red on one side, blue on the other');
+    await picture(page, 'studio');
+
+    // A lamp is dragged: what the server says meanwhile of earlier places does not pull it back.
+    const bulb = (await state(page)).lights.find(({ name }) => name === 'bulb');
+    await page.evaluate((id) => window.radiosity.app.selectLight(id), bulb.id);
+    await page.waitForTimeout(200);
+    const [x, y] = await handle(page);
+    await page.evaluate((id) => {
+      window.seen = [];
+      const look = () => {
+        window.seen.push(window.radiosity.app.lights.get(id).position[0]);
+        requestAnimationFrame(look);
+      };
+      look();
+    }, bulb.id);
+    await page.mouse.move(x, y);
+    await page.waitForTimeout(100);
+    await page.mouse.down();
+    for (let step = 1; step <= 25; step += 1) await page.mouse.move(x + 4 * step, y);
+    await page.mouse.up();
+    await page.waitForTimeout(500);
+    await done(page, 1);
+    const seen = await page.evaluate(() => window.seen);
+    assert.ok(seen.at(-1) > bulb.position[0] + 0.1, `${seen.at(-1)}`);
+    seen.forEach((at, i) => assert.ok(i === 0 || at >= seen[i - 1] - 1e-6, 'it never goes back'));
+    const off = await compared(page);
+    console.log(`a lamp dragged by ${(seen.at(-1) - bulb.position[0]).toFixed(2)} m: ${(100 * off).toFixed(1)} % from a batch solve`);
+    assert.ok(off < NEAR, `${off}`);
+
+    // Undone, the lamp and its handles are where they were.
+    await page.keyboard.press('Control+z');
+    await page.waitForFunction(([id, x]) => Math.abs(window.radiosity.app.lights.get(id).position[0] - x) < 1e-6, [bulb.id, bulb.position[0]]);
+    const handles = await page.evaluate(() => window.radiosity.app.gizmo.where());
+    assert.ok(Math.abs(handles[0] - bulb.position[0]) < 1e-5, `${handles}`);
+
+    // By keys it is moved and turned, and the spot tilted.
+    await page.keyboard.press('k');
+    await page.waitForFunction(([id, x]) => window.radiosity.app.lights.get(id).position[0] > x + 0.01, [bulb.id, bulb.position[0]]);
+    const spot = (await state(page)).lights.find(({ name }) => name === 'spot');
+    await page.evaluate((id) => window.radiosity.app.selectLight(id), spot.id);
+    const { edits } = (await state(page)).status;
+    for (const key of ['Home', 'Home', ',']) await page.keyboard.press(key);
+    await done(page, edits + 3);
+    const turned = (await state(page)).lights.find(({ name }) => name === 'spot');
+    turned.position.forEach((value, k) => assert.ok(Math.abs(value - spot.position[k]) < 1e-5, 'it turns in its place'));
+    assert.ok(Math.abs(turned.matrix[5] - Math.cos((10 * Math.PI) / 180)) < 1e-4, `${turned.matrix}`);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await lit.end();
+  });
+});
