@@ -12,6 +12,9 @@ const NODE: u32 = 20;
 /// Names of the browser whose engine the tests are written for.
 const BROWSERS: &[&str] = &["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
+/// The tests, each with a program and a browser of its own.
+const TESTS: &[&str] = &["test/page.test.mjs", "test/edit.test.mjs", "test/keys.test.mjs"];
+
 /// `cargo xtask viewer`.
 pub fn command(arguments: &[&str]) -> Result<String, Fault> {
     let root = crate::root();
@@ -48,7 +51,7 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
             for name in names {
                 tests.args(["--test-name-pattern", name]);
             }
-            tests.arg("test/page.test.mjs").env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
+            tests.args(TESTS).env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
             run(&mut tests)?;
             Ok("viewer: all tests passed".to_owned())
         }

@@ -58,13 +58,23 @@ const TURN = 5;
 
 /** Where it is kept that keys of one letter do nothing: who speaks to the machine would set them off (WCAG 2.1.4). */
 const LETTERS = 'radiosity.letters';
-let lettersAct = localStorage.getItem(LETTERS) !== 'off';
+let lettersAct = remembered() !== 'off';
+
+/** Browsers may refuse to remember anything. */
+function remembered(letters?: string): string | null {
+  try {
+    if (letters) localStorage.setItem(LETTERS, letters);
+    return localStorage.getItem(LETTERS);
+  } catch {
+    return null;
+  }
+}
 
 /** The list of keys. */
 export function helpDialog(): HTMLDialogElement {
   const letters = toggle('Keys of one letter or sign (off: all that they do is in the panel and the bar)', (is) => {
     lettersAct = is;
-    localStorage.setItem(LETTERS, is ? 'on' : 'off');
+    remembered(is ? 'on' : 'off');
   });
   letters.id = 'letters';
   letters.set(lettersAct);

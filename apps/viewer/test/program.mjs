@@ -56,7 +56,7 @@ export async function browser() {
   });
   return {
     close: () => own.close(),
-    async open(url, { width = 1400, height = 900, touch = false } = {}) {
+    async open(url, { width = 1100, height = 720, touch = false } = {}) {
       const context = await own.newContext({ viewport: { width, height }, hasTouch: touch, isMobile: touch, acceptDownloads: true });
       if (process.env.PAGE) await context.route(url, instead);
       const page = await context.newPage();
@@ -168,7 +168,8 @@ export async function compared(page, count = 150) {
   return difference(pairs.map(([lux]) => lux), pairs.map(([, lux]) => lux));
 }
 
-/** A page that looks at all light and never reads what it is sent: `end` closes it. */
+/** A page that never reads what it is sent, and asks for all light again and again, some 30 MB of it: more than the buffers
+ *  of both ends hold. `end` closes it. */
 export async function stuck(url) {
   const { host, hostname, port, pathname, origin } = new URL(url);
   const socket = connect(Number(port), hostname);
@@ -180,9 +181,10 @@ export async function stuck(url) {
   socket.pause();
   // A frame of text with a mask of zeros.
   const text = Buffer.from(JSON.stringify({ kind: 'layer', layer: 'total', epoch: 1 }));
-  socket.write(Buffer.concat([Buffer.from([0x81, 0x80 | text.length, 0, 0, 0, 0]), text]));
+  const frame = Buffer.concat([Buffer.from([0x81, 0x80 | text.length, 0, 0, 0, 0]), text]);
+  for (let i = 0; i < 400; i += 1) socket.write(frame);
   socket.on('error', () => {});
-  return { end: () => socket.destroy(), read: () => socket.bytesRead };
+  return { end: () => socket.destroy() };
 }
 
 /** A picture for people. */
