@@ -93,6 +93,8 @@ export function thingPanel(app: App): HTMLElement {
     none.hidden = Boolean(placed);
     if (!placed) return;
     name.textContent = object ? object.name || `Object ${object.id + 1}` : light!.name || `Light ${light!.id + 1}`;
+    // The list tells the name of the whole already.
+    name.hidden = name.textContent === list.selectedOptions[0]?.text;
     painting.hidden = copying.hidden = !object;
     if (object) {
       if (!isOpen(paint)) paint.value = hex(object.reflectance);
