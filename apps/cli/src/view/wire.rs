@@ -365,6 +365,7 @@ pub fn texture(texture: &Texture) -> Result<Vec<u8>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use radiosity::session::{Session, SessionOptions};
 
     #[test]
     fn what_is_no_request_is_refused() {
@@ -410,5 +411,29 @@ mod tests {
         assert_eq!(frame.len() % 4, 0);
         assert_eq!(words[..5], [LIGHT, 5, 3, 1024, 1]);
         assert_eq!(words[5..], [0x4000_3c00, 0x7bff]);
+    }
+
+    #[test]
+    fn colours_of_vertices_are_those_of_the_author_in_between() {
+        let mut scene = radiosity::cornell_box();
+        let options = SessionOptions { elements: 300, rays: 4, ..SessionOptions::default() };
+        let plain = Session::new(scene.clone(), &options).unwrap();
+        let model = plain.model();
+        assert!(model.objects.iter().all(|object| colours(object, plain.scene()).is_empty()));
+        assert_eq!(mesh(&model.objects[0], plain.scene())[16..20], [0; 4], "no flags");
+
+        // Linear in the place, so that what lies between corners is known.
+        let colour = |p: DVec3| [0.5 + 0.1 * p.x, 0.5 + 0.1 * p.y, 0.5 + 0.1 * p.z].map(|c| c as f32);
+        scene.colors = scene.positions.iter().map(|p| colour(*p)).map(|[r, g, b]| [r, g, b, 1.0]).collect();
+        let session = Session::new(scene, &options).unwrap();
+        for object in session.model().objects {
+            let found = colours(&object, session.scene());
+            assert_eq!(found.len(), object.positions.len());
+            for (found, p) in found.iter().zip(&object.positions) {
+                let right = colour(DVec3::from(p.map(f64::from)));
+                assert!(found.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?} {right:?}");
+            }
+            assert_eq!(mesh(&object, session.scene())[16], HAS_COLOURS as u8);
+        }
     }
 }
