@@ -56,7 +56,7 @@ export async function browser() {
   });
   return {
     close: () => own.close(),
-    async open(url, { width = 1100, height = 720, touch = false } = {}) {
+    async open(url, { width = 1000, height = 660, touch = false } = {}) {
       const context = await own.newContext({ viewport: { width, height }, hasTouch: touch, isMobile: touch, acceptDownloads: true });
       if (process.env.PAGE) await context.route(url, instead);
       const page = await context.newPage();
@@ -99,13 +99,18 @@ export async function done(page, edits = 0) {
 
 /** Undoes everything, so that tests do not depend on each other. */
 export async function restored(page) {
-  for (;;) {
-    const { undo, status } = await state(page);
-    if (undo === null) break;
-    await page.evaluate(() => window.radiosity.app.undo());
-    await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, status.edits);
-    await page.waitForTimeout(50);
-  }
+  await page.evaluate(async () => {
+    const { app, state } = window.radiosity;
+    const until = async (is) => {
+      while (!is()) await new Promise((done) => { setTimeout(done, 5); });
+    };
+    while (app.undoable !== null) {
+      const { edits } = state().status;
+      app.undo();
+      // What can be undone next has been told by then.
+      await until(() => state().status.edits > edits);
+    }
+  });
   await done(page);
 }
 
@@ -116,7 +121,7 @@ async function quiet(page) {
     const { received } = await state(page);
     if (received === last) return;
     last = received;
-    await page.waitForTimeout(300);
+    await page.waitForTimeout(200);
   }
 }
 
