@@ -72,5 +72,5 @@ export function viewPanel(app: App): HTMLElement {
     el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Layer'), layer),
     el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Exposure'), exposure),
     automatic, isolines, edges, rays,
-    el('div', { class: 'row' }, button('Look freely with the mouse', () => app.lookFreely(), { key: 'Y' })));
+    el('div', { class: 'row mouse' }, button('Look freely with the mouse', () => app.lookFreely(), { key: 'Y' })));
 }
