@@ -194,7 +194,12 @@ impl SolveArguments {
         let default = radiosity::MeasureOptions::default();
         radiosity::MeasureOptions {
             error: self.error,
-            solve: self.options(),
+            solve: radiosity::SolveOptions {
+                looked_up: default.solve.looked_up,
+                cells: default.solve.cells,
+                rays: default.solve.rays,
+                ..self.options()
+            },
             rounds: self.rounds,
             seed: self.seed,
             ..default

@@ -31,14 +31,14 @@ pub struct MeasureOptions {
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        let solve = SolveOptions { looked_up: true, rays: 16, ..SolveOptions::default() };
+        let solve = SolveOptions { looked_up: true, cells: 1000, rays: 16, ..SolveOptions::default() };
         MeasureOptions { error: 0.01, solve, audit_points: 1000, rounds: 5, seed: 1 }
     }
 }
 
 /// Cells that a gather at each point looks up, at most, and how many at an error of 1 %: what each has wrong averages out
 /// over its rays.
-const LOOKED_UP_CELLS: [f64; 2] = [50_000.0, 10_000.0];
+const LOOKED_UP_CELLS: [f64; 2] = [50_000.0, 5_000.0];
 
 /// Variation of direct light within an element that is looked up, by the error asked.
 const VARIATION: f64 = 5.0;

