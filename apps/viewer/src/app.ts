@@ -4,6 +4,7 @@ import { Ahead } from './ahead';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
 import { lay, read, type Grid } from './grid';
+import { beside, lampAhead, type LampKind } from './lamps';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
 import { corners, Stage, type Hit } from './stage';
@@ -21,6 +22,9 @@ export type Topic =
 const GESTURE = 40;
 
 const WRAPS = { repeat: RepeatWrapping, mirror: MirroredRepeatWrapping, clamp: ClampToEdgeWrapping } as const;
+
+/** How a refusal begins that is about the layer that is shown, and not about what was changed. */
+const OF_LAYERS = /^Pages look at/;
 
 /** What was measured at a point, and where it is. */
 export interface Probed {
@@ -48,12 +52,16 @@ export class App {
   /** Milliseconds from the beginning of the page to the whole scene. */
   opened: number | null = null;
   layer: Layer = 'total';
+  /** Why the light of the layer does not follow changes; empty while it does. */
+  resting = '';
   falseColours = false;
   edges = false;
   raysShown = false;
   selected: number | null = null;
   /** A light without an object that is moved. */
   selectedLight: number | null = null;
+  /** Of which kind the next lamp is that is added. */
+  lampKind: LampKind = 'point';
   probed: Probed | null = null;
   grid: Grid | null = null;
   message = '';
@@ -64,6 +72,8 @@ export class App {
   private news = new Set<Topic>();
   /** Where copies will be that were asked for: the first that comes is selected. */
   private awaited: number[][] = [];
+  /** Which new lamp will be selected. */
+  private awaitedLamp: ((light: LightNotice) => boolean) | null = null;
   private loosened = new Set<number>();
   private textures = new Map<string, Texture>();
   private question = 0;
@@ -138,7 +148,7 @@ export class App {
         this.objectsAhead.hear(notice);
         break;
       case 'light':
-        this.lightsAhead.hear(notice);
+        this.hearLight(notice);
         break;
       case 'status':
         this.status = notice;
@@ -167,7 +177,8 @@ export class App {
         break;
       case 'refused':
         this.say(notice.message);
-        this.takeBack();
+        if (OF_LAYERS.test(notice.message)) this.rest(notice.message);
+        else this.takeBack();
         break;
     }
   }
@@ -221,22 +232,39 @@ export class App {
       else this.gizmo.place();
       this.tellSoon('selection');
     }
+    if (light.deleted && typeof this.layer === 'object' && 'light' in this.layer && this.layer.light === light.id) this.showLayer('total');
     this.tellSoon('lights');
   }
 
   /** Whether an object is one of the copies that were asked for. */
   private welcome(object: ObjectNotice): void {
     if (this.objects.has(object.id)) return;
-    const at = this.awaited.findIndex((matrix) => matrix.every((x, i) => Math.abs(x - object.matrix[i]) < 1e-9 * Math.max(1, Math.abs(x))));
+    const at = this.awaited.findIndex((matrix) => isPlace(object.matrix, matrix));
     if (at < 0) return;
     this.awaited = [];
     this.objects.set(object.id, object);
     this.select(object.id);
   }
 
+  /** The server says how a light is; a new one that was asked for is selected. */
+  private hearLight(light: LightNotice): void {
+    const isAwaited = !this.lights.has(light.id) && this.awaitedLamp?.(light);
+    this.lightsAhead.hear(light);
+    if (isAwaited) this.selectLight(light.id);
+  }
+
+  /** Light of the layer stays as it is, or follows again. */
+  private rest(message: string): void {
+    if (message === this.resting) return;
+    if (this.message === this.resting) this.say('');
+    this.resting = message;
+    this.tell('view');
+  }
+
   /** What was refused is as before, here too. */
   private takeBack(): void {
     this.awaited = [];
+    this.awaitedLamp = null;
     this.objectsAhead.takeBack();
     this.lightsAhead.takeBack();
     for (const topic of ['objects', 'lights', 'selection'] as const) this.tell(topic);
@@ -260,6 +288,7 @@ export class App {
   private shine(frame: LightFrame): void {
     const surface = this.stage.surfaces.get(frame.object);
     if (surface) this.stage.shine(surface, frame.first, frame.values);
+    this.rest('');
     this.exposure.lit();
   }
 
@@ -433,7 +462,41 @@ export class App {
     return middle;
   }
 
+  /** Adds a lamp without area where it is seen. */
+  addLamp(kind = this.lampKind): void {
+    const names = new Set([...this.lights.values()].map(({ name }) => name));
+    let number = 1;
+    while (names.has(`Lamp ${number}`)) number += 1;
+    const light = lampAhead(this.stage, this.navigator.scale, kind, `Lamp ${number}`);
+    this.awaitedLamp = ({ name }) => name === light.name;
+    this.say(`Added: ${light.name}. It is selected.`);
+    this.edit({ add_light: { light } });
+  }
+
+  /** The selected lamp without area, if it is one that can be placed. */
+  private lamp(): LightNotice | null {
+    const light = this.selectedLight === null ? undefined : this.lights.get(this.selectedLight);
+    return light && isLamp(light) ? light : null;
+  }
+
+  /** Whether what is selected can be duplicated and deleted. */
+  get isCopyable(): boolean {
+    return this.selected !== null || this.lamp() !== null;
+  }
+
+  private duplicateLamp({ id, matrix, position }: LightNotice): void {
+    // Parallel light has no place to be beside.
+    const way = position ? beside(this.stage, this.navigator.scale, this.stage.root.localToWorld(new Vector3().fromArray(position))) : new Vector3();
+    const motion = this.inScene(new Matrix4().makeTranslation(way));
+    const copy = motion.multiply(new Matrix4().fromArray(matrix)).toArray();
+    this.awaitedLamp = (light) => isLamp(light) && isPlace(light.matrix, copy);
+    this.say('Duplicated: the copy is selected.');
+    this.edit({ copy_light: { light: id, matrix: copy } });
+  }
+
   duplicate(): void {
+    const lamp = this.lamp();
+    if (lamp) this.duplicateLamp(lamp);
     if (this.group().length === 0) return;
     // Beside the first, to the right of who looks, so that one sees that there are two.
     const right = new Vector3(1, 0, 0).applyQuaternion(this.stage.camera.quaternion).setY(0).normalize();
@@ -447,6 +510,11 @@ export class App {
   }
 
   delete(): void {
+    const lamp = this.lamp();
+    if (lamp) {
+      this.say(`Deleted: ${this.lightName(lamp)}. Undo brings it back.`);
+      this.edit({ delete_light: { light: lamp.id } });
+    }
     const deletions: Edit[] = this.group().map((surface) => ({ delete: { object: surface.object } }));
     if (deletions.length > 0) this.edit(deletions.length === 1 ? deletions[0] : { several: deletions });
   }
@@ -459,6 +527,7 @@ export class App {
 
   select(object: number | null): void {
     this.awaited = [];
+    this.awaitedLamp = null;
     this.selected = object;
     this.selectedLight = null;
     this.marks.outline(this.group());
@@ -473,14 +542,21 @@ export class App {
     this.tell('selection');
   }
 
+  /** What people call a light: copies have the name of the first, and numbers. */
+  lightName({ id, name }: LightNotice): string {
+    if (!name) return `Light ${id + 1}`;
+    const before = [...this.lights.values()].filter((light) => light.id < id && light.name === name).length;
+    return before > 0 ? `${name} (${before + 1})` : name;
+  }
+
   /** Things and lamps that are there, by name: what can be selected. */
   things(): { name: string; object?: number; light?: number }[] {
     const groups = new Map<number, ObjectNotice>();
     for (const object of this.objects.values()) if (!object.deleted && !groups.has(object.group)) groups.set(object.group, object);
-    const lamps = [...this.lights.values()].filter((light) => !light.deleted && light.object === null && light.type !== 'sky');
+    const lamps = [...this.lights.values()].filter((light) => !light.deleted && isLamp(light));
     return [
       ...[...groups.values()].map(({ id, name }) => ({ name: name || `Object ${id + 1}`, object: id })),
-      ...lamps.map(({ id, name }) => ({ name: name || `Light ${id + 1}`, light: id })),
+      ...lamps.map((lamp) => ({ name: this.lightName(lamp), light: lamp.id })),
     ];
   }
 
@@ -555,6 +631,7 @@ export class App {
   showLayer(layer: Layer): void {
     if (JSON.stringify(layer) === JSON.stringify(this.layer)) return;
     this.layer = layer;
+    this.resting = '';
     // Light of the last layer would be taken for that of this one.
     for (const surface of this.stage.surfaces.values()) this.stage.shine(surface, 0, new Uint16Array(surface.light.array.length));
     shared.emissionShown.value = layer === 'total' || layer === 'direct' ? 1 : 0;
@@ -634,6 +711,16 @@ export class App {
     this.navigator.set(mode);
     this.tell('view');
   }
+}
+
+/** Whether a light is a lamp without area, which can be placed by itself. */
+function isLamp({ object, type }: LightNotice): boolean {
+  return object === null && type !== 'sky';
+}
+
+/** Whether a place is the one that was asked for. */
+function isPlace(matrix: number[], asked: number[]): boolean {
+  return asked.every((x, i) => Math.abs(x - matrix[i]) < 1e-9 * Math.max(1, Math.abs(x)));
 }
 
 /** A turn about an axis through a point. */

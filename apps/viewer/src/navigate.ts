@@ -39,7 +39,8 @@ export class Navigator {
   readonly orbit: OrbitControls;
   /** Nothing moves while something is dragged. */
   held = false;
-  private scale = 1;
+  /** As long as a metre is to people who fit into the scene. */
+  scale = 1;
   private dragged: number | null = null;
   private last: [number, number] = [0, 0];
 

@@ -119,12 +119,25 @@ export type Notice =
 /** What a layer shows. */
 export type Layer = 'total' | 'direct' | 'indirect' | 'error' | { bounce: number } | { light: number };
 
+/** A light without area that is to be added. Without a direction it shines down. */
+export interface NewLight {
+  name: string;
+  kind: 'point' | 'directional' | { spot: { inner: number; outer: number } };
+  position?: number[];
+  direction?: number[];
+  /** cd, or lx of parallel light. */
+  intensity: number[];
+}
+
 /** A change of the scene. */
 export type Edit =
   | { light: { light: number; dimming: number; colour: number[] } }
   | { reflectance: { object: number; reflectance: number[] } }
   | { move: { object: number; matrix: number[] } }
   | { move_light: { light: number; matrix: number[] } }
+  | { add_light: { light: NewLight } }
+  | { copy_light: { light: number; matrix: number[] } }
+  | { delete_light: { light: number } }
   | { copy: { object: number; matrix: number[] } }
   | { delete: { object: number } }
   | { several: Edit[] };

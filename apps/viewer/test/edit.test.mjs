@@ -305,3 +305,117 @@ test('lamps without area, sheets and colours at vertices', async () => {
     await lit.end();
   });
 });
+
+test('a lamp is added, duplicated, deleted and brought back by keyboard and by mouse, and light follows as a batch solve has it', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const there = (id) => page.waitForFunction((id) => window.radiosity.state().lights.some((light) => light.id === id && !light.deleted), id);
+  const gone = (id) => page.waitForFunction((id) => window.radiosity.state().lights.find((light) => light.id === id).deleted, id);
+  const selected = async (count) => {
+    await page.waitForFunction((count) => window.radiosity.state().lights.length === count && window.radiosity.state().selectedLight !== null, count);
+    const { lights, selectedLight } = await state(page);
+    return lights.find(({ id }) => id === selectedLight);
+  };
+  const { lights, status: { edits } } = await state(page);
+  const before = await luxOf(page, 150);
+
+  await page.keyboard.press('Insert');
+  const lamp = await selected(lights.length + 1);
+  assert.deepEqual([lamp.name, lamp.type, lamp.dimming, lamp.object], ['Lamp 1', 'point', 1, null]);
+  const isInside = await page.evaluate((at) => {
+    const { scene } = window.radiosity.app;
+    return at.every((x, k) => x > scene.low[k] && x < scene.high[k]);
+  }, lamp.position);
+  assert.ok(isInside, `${lamp.position}`);
+  await done(page, edits + 1);
+  const with_it = await luxOf(page, before.points);
+  const mean = ({ lux }) => lux.reduce((sum, x) => sum + x, 0) / lux.length;
+  assert.ok(mean(with_it) > 1.1 * mean(before), `${mean(before)} lx before, ${mean(with_it)} with it`);
+  with_it.lux.forEach((lux, i) => assert.ok(lux >= 0.999 * before.lux[i], 'nowhere less'));
+  const off = await compared(page);
+  console.log(`a lamp of 1000 lm at ${lamp.position.map((x) => x.toFixed(2))}: ${mean(before).toFixed(0)} lx to ${mean(with_it).toFixed(0)} lx, ${(100 * off).toFixed(1)} % from a batch solve`);
+  assert.ok(off < NEAR, `${off}`);
+  await page.locator('#lights').scrollIntoViewIfNeeded();
+  await picture(page, 'lamp-added');
+
+  // The copy stands beside it, and it is the copy that goes.
+  await page.keyboard.press('Control+d');
+  const copy = await selected(lights.length + 2);
+  assert.notEqual(copy.id, lamp.id);
+  const way = Math.hypot(...copy.position.map((x, k) => x - lamp.position[k]));
+  assert.ok(way > 0.01 && way < 1, `${way}`);
+  assert.equal(await page.locator('.light b', { hasText: 'Lamp 1 (2)' }).isVisible(), true);
+  await page.keyboard.press('Delete');
+  await gone(copy.id);
+  assert.equal(await page.locator('.light b', { hasText: 'Lamp 1 (2)' }).isVisible(), false);
+  await done(page, edits + 3);
+  const again = await luxOf(page, before.points);
+  assert.ok(difference(again.lux, with_it.lux) < 1e-3, 'one lamp as before');
+
+  // Deleted while it alone is shown, all light is shown; undo brings it back.
+  await page.evaluate((id) => window.radiosity.app.selectLight(id), lamp.id);
+  await page.evaluate((id) => window.radiosity.app.showLayer({ light: id }), lamp.id);
+  await page.keyboard.press('Delete');
+  await gone(lamp.id);
+  await done(page, edits + 4);
+  assert.deepEqual([(await state(page)).selectedLight, (await state(page)).layer], [null, 'total']);
+  assert.ok(difference((await luxOf(page, before.points)).lux, before.lux) < 1e-3, 'dark as before');
+  await page.keyboard.press('Control+z');
+  await there(lamp.id);
+  await done(page, edits + 5);
+  assert.ok(difference((await luxOf(page, before.points)).lux, with_it.lux) < 1e-3, 'its light is back');
+
+  // By mouse: a spot hangs below the ceiling and shines down; it is found on the canvas, duplicated and deleted.
+  await page.locator('#lamp-kind').selectOption('spot');
+  await page.locator('#lights button', { hasText: 'Add a lamp' }).click();
+  const spot = await selected(lights.length + 3);
+  assert.deepEqual([spot.name, spot.type], ['Lamp 2', 'spot']);
+  assert.ok(spot.position[1] > lamp.position[1], `${spot.position}`);
+  await page.locator('#thing button', { hasText: 'Duplicate' }).click();
+  const other = await selected(lights.length + 4);
+  await page.locator('#thing button', { hasText: 'Delete' }).click();
+  await gone(other.id);
+  await there(spot.id);
+  await page.locator('#lamp-kind').selectOption('directional');
+  await page.locator('#lights button', { hasText: 'Add a lamp' }).click();
+  assert.equal((await selected(lights.length + 5)).type, 'directional');
+  await done(page, edits + 9);
+  const all = await compared(page);
+  console.log(`with a spot and parallel light, too: ${(100 * all).toFixed(1)} % from a batch solve`);
+  await picture(page, 'lamps-added');
+  await restored(page);
+  assert.ok(difference((await luxOf(page, before.points)).lux, before.lux) < 1e-3, 'all is undone');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('where too many layers are looked at, the page says that its own rests, until it follows again', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  assert.equal(await page.locator('#resting').isVisible(), false);
+  // What was changed and is not confirmed has nothing to do with it, and stays.
+  await page.evaluate(async () => {
+    const { app } = window.radiosity;
+    const address = new URL('socket', location.href);
+    address.protocol = 'ws:';
+    window.others = await Promise.all(Array.from({ length: 8 }, (_, i) => new Promise((open) => {
+      const socket = new WebSocket(address);
+      socket.onopen = () => {
+        socket.send(JSON.stringify({ kind: 'layer', layer: { bounce: i + 1 }, epoch: 1 }));
+        open(socket);
+      };
+    })));
+    app.awaited = [[1]];
+  });
+  await page.waitForFunction(() => /layers of light/.test(window.radiosity.state().message));
+  assert.deepEqual(await page.evaluate(() => window.radiosity.app.awaited), [[1]]);
+  assert.match(await page.locator('#resting').innerText(), /layers of light; this one stays as it is/);
+  await picture(page, 'resting');
+  await page.evaluate(() => {
+    window.radiosity.app.awaited = [];
+    window.others.forEach((socket) => socket.close());
+  });
+  await page.locator('#resting').waitFor({ state: 'hidden', timeout: 20_000 });
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});

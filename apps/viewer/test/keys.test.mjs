@@ -117,7 +117,7 @@ test('groups, menus and lists are as keyboards expect them, and keys of one lett
   // Shortcuts are named as the standard names them.
   const names = await page.locator('[aria-keyshortcuts]').evaluateAll((all) => all.map((one) => one.getAttribute('aria-keyshortcuts')));
   assert.ok(names.includes('Control+Z'));
-  for (const name of names) for (const key of name.split(' ')) assert.match(key, /^((Control|Shift)\+)*([A-Z0-9]|F2|Delete)$/, name);
+  for (const name of names) for (const key of name.split(' ')) assert.match(key, /^((Control|Shift)\+)*([A-Z0-9]|F2|Delete|Insert)$/, name);
 
   // A thing is chosen from the list.
   const block = (await state(page)).objects.find((object) => object.name === 'tall block');

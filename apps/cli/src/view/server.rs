@@ -181,6 +181,8 @@ struct Place {
 impl Drop for Place {
     fn drop(&mut self) {
         self.server.pages.fetch_sub(1, Ordering::Relaxed);
+        // Its layer is left by now, and one that rested for it is to be looked after. Who is busy looks anyway.
+        let _ = self.server.commands.try_send(Command::Watch);
     }
 }
 

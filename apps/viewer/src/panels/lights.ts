@@ -1,10 +1,11 @@
-// Lights: on and off, dimming, colour.
+// Lights: on and off, dimming, colour, and new ones.
 import type { App } from '../app';
+import { LAMPS, type LampKind } from '../lamps';
 import { luminance } from '../luminance';
 import type { LightNotice } from '../wire';
 import { button, el, hex, isOpen, linear, section, slider } from './parts';
 
-const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', directional: 'Directional', sky: 'Sky' };
+const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', directional: 'Parallel', sky: 'Sky' };
 
 export function lightsPanel(app: App): HTMLElement {
   const list = el('div', { class: 'list' });
@@ -13,6 +14,10 @@ export function lightsPanel(app: App): HTMLElement {
   const all = el('div', { class: 'row' },
     button('All on', () => app.setLights(1), { title: 'Turn all lights on' }),
     button('All off', () => app.setLights(0), { title: 'Turn all lights off' }));
+  const kind = el('select', {
+    id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind; },
+  }, ...LAMPS.map(([value, text]) => el('option', { value }, text)));
+  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp in the middle of the picture: 1000 lm, parallel light 10 000 lx' }));
   app.on('lights', () => {
     for (const light of app.lights.values()) {
       if (!rows.has(light.id)) {
@@ -22,10 +27,11 @@ export function lightsPanel(app: App): HTMLElement {
       }
       rows.get(light.id)!(light);
     }
-    none.hidden = rows.size > 0;
-    all.hidden = rows.size < 2;
+    const there = [...app.lights.values()].filter(({ deleted }) => !deleted).length;
+    none.hidden = there > 0;
+    all.hidden = there < 2;
   });
-  return section('lights', 'Lights', true, none, all, list);
+  return section('lights', 'Lights', true, none, add, all, list);
 }
 
 function row(app: App, id: number): { element: HTMLElement; set(light: LightNotice): void } {
@@ -38,7 +44,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     if (isLast) gesture = null;
     return now;
   };
-  const name = light().name || `Light ${id + 1}`;
+  const name = app.lightName(light());
   const on = el('input', {
     type: 'checkbox', role: 'switch', 'aria-label': `${name} on`,
     change: () => app.setLight(light(), { dimming: on.checked ? last || 1 : 0 }),

@@ -92,10 +92,11 @@ export function thingPanel(app: App): HTMLElement {
     body.hidden = !placed;
     none.hidden = Boolean(placed);
     if (!placed) return;
-    name.textContent = object ? object.name || `Object ${object.id + 1}` : light!.name || `Light ${light!.id + 1}`;
+    name.textContent = object ? object.name || `Object ${object.id + 1}` : app.lightName(light!);
     // The list tells the name of the whole already.
     name.hidden = name.textContent === list.selectedOptions[0]?.text;
-    painting.hidden = copying.hidden = !object;
+    painting.hidden = !object;
+    copying.hidden = !app.isCopyable;
     if (object) {
       if (!isOpen(paint)) paint.value = hex(object.reflectance);
       if (!isOpen(reflectance)) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);

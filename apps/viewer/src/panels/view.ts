@@ -11,7 +11,8 @@ export function layerName(app: App, layer: Layer): string {
   if (layer === 'indirect') return 'Indirect light';
   if (layer === 'error') return 'Estimated error';
   if ('bounce' in layer) return layer.bounce === 1 ? 'First bounce' : `Bounce ${layer.bounce}`;
-  return app.lights.get(layer.light)?.name || `Light ${layer.light + 1}`;
+  const light = app.lights.get(layer.light);
+  return light ? app.lightName(light) : `Light ${layer.light + 1}`;
 }
 
 /** Bounces that have a layer of their own. */
@@ -28,6 +29,7 @@ export function viewPanel(app: App): HTMLElement {
   const layer = el('select', {
     id: 'layer', 'aria-label': 'Layer of light', change: () => app.showLayer(JSON.parse(layer.value) as Layer),
   });
+  const resting = el('p', { class: 'warning', id: 'resting' });
   const low = el('input', { type: 'number', min: 0, step: 'any', 'aria-label': 'Lower end of the scale, lx', change: () => setRange() });
   const high = el('input', { type: 'number', min: 0, step: 'any', 'aria-label': 'Upper end of the scale, lx', change: () => setRange() });
   const setRange = () => {
@@ -61,6 +63,8 @@ export function viewPanel(app: App): HTMLElement {
     edges.set(app.edges);
     rays.set(app.raysShown);
     layer.value = JSON.stringify(app.layer);
+    resting.textContent = app.resting;
+    resting.hidden = !app.resting;
     scale.hidden = !app.falseColours && !shared.isolines.value && app.layer !== 'error';
     for (const [input, value] of [[low, app.exposure.range[0]], [high, app.exposure.range[1]]] as const) {
       if (!isOpen(input)) input.value = String(Number(value.toPrecision(3)));
@@ -69,7 +73,7 @@ export function viewPanel(app: App): HTMLElement {
   return section('view', 'View', true,
     el('div', { class: 'row' }, look),
     scale,
-    el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Layer'), layer),
+    el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Layer'), layer), resting,
     el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Exposure'), exposure),
     automatic, isolines, edges, rays,
     el('div', { class: 'row mouse' }, button('Look freely with the mouse', () => app.lookFreely(), { key: 'Y' })));

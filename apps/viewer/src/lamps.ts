@@ -1,0 +1,63 @@
+// Lamps without area that a person adds: how bright they are, and where one looks for them.
+import { DoubleSide, Ray, Vector3 } from 'three';
+import type { Stage } from './stage';
+import type { NewLight } from './wire';
+
+/** Kinds of lamps that can be added, and what people call them. */
+export const LAMPS = [['point', 'Point'], ['spot', 'Spot'], ['directional', 'Parallel']] as const;
+export type LampKind = (typeof LAMPS)[number][0];
+
+/** What a lamp gives, lm: a bulb of 75 W in the days of filaments, or an LED of 9 W. */
+const FLUX = 1000;
+
+/** Half angles of a spot, radians: full within 15°, nothing beyond 30°, as lamps for accents have it. */
+const [INNER, OUTER] = [Math.PI / 12, Math.PI / 6];
+
+/** Parallel light, lx: a low or veiled sun. A clear one at noon is ten times that. */
+const SUN = 10_000;
+
+/** Metres ahead, in rooms that people are made for. */
+const AHEAD = 2;
+
+/** Metres below the ceiling: light that falls on it at an angle would need a finer mesh than is there. */
+const BELOW = 0.1;
+
+/** Solid angle that a spot fills as if it were as bright everywhere as in its middle: it fades by the square of what is left
+ *  of the cosine between both angles, as glTF has it. */
+const SPOT = 2 * Math.PI * (1 - Math.cos(INNER) + (Math.cos(INNER) - Math.cos(OUTER)) / 3);
+
+/** A lamp of a kind where who looks sees it. `metre` is as long as a metre is to people who fit into the scene. */
+export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: string): NewLight {
+  const white = (intensity: number) => [intensity, intensity, intensity];
+  const level = (x: number, y: number, z: number) => new Vector3(x, y, z).applyQuaternion(stage.camera.quaternion).setY(0).normalize();
+  const at = (place: Vector3) => stage.toScene(place).toArray();
+  const place = ahead(stage, metre);
+  if (kind === 'directional') {
+    // Over the left shoulder, 45° high: what one sees is lit, and its shadows are seen.
+    const direction = level(0.5, 0, -1).add(new Vector3(0, -1, 0));
+    return { name, kind, direction: stage.toScene(direction).toArray(), intensity: white(SUN) };
+  }
+  if (kind === 'point') return { name, kind, position: at(place), intensity: white(FLUX / (4 * Math.PI)) };
+  const ceiling = stage.cast(place, new Vector3(0, 1, 0), Infinity, DoubleSide);
+  place.y += ceiling ? Math.max(0.5 * ceiling.distance, ceiling.distance - BELOW * metre) : metre;
+  return { name, kind: { spot: { inner: INNER, outer: OUTER } }, position: at(place), intensity: white(FLUX / SPOT) };
+}
+
+/** A place in the air in the middle of the picture, no farther than half way to what is seen there. */
+function ahead(stage: Stage, metre: number): Vector3 {
+  const { bounds, camera } = stage;
+  const hit = stage.pick(0, 0);
+  const ray = new Ray(camera.position, camera.getWorldDirection(new Vector3()));
+  // Who looks from outside looks for it inside.
+  const entry = bounds.containsPoint(camera.position) ? camera.position : ray.intersectBox(bounds, new Vector3());
+  if (!entry) return bounds.getCenter(new Vector3());
+  const before = entry.distanceTo(camera.position);
+  return ray.at(before + Math.min(AHEAD * metre, hit ? 0.5 * Math.max(0, hit.distance - before) : Infinity), new Vector3());
+}
+
+/** Half a metre to the side of a lamp, on the right of who looks, or where there is more room: no wall is between them. */
+export function beside(stage: Stage, metre: number, place: Vector3): Vector3 {
+  const right = new Vector3(1, 0, 0).applyQuaternion(stage.camera.quaternion).setY(0).normalize();
+  const [free, back] = [right, right.clone().negate()].map((way) => stage.cast(place, way, metre, DoubleSide)?.distance ?? metre);
+  return right.multiplyScalar(free >= back ? 0.5 * free : -0.5 * back);
+}
