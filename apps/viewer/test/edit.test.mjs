@@ -382,6 +382,8 @@ test('a lamp is added, duplicated, deleted and brought back by keyboard and by m
   await done(page, edits + 9);
   const all = await compared(page);
   console.log(`with a spot and parallel light, too: ${(100 * all).toFixed(1)} % from a batch solve`);
+  // Shadows of parallel light are sharp, and each lamp has some: 0.084 here, 0.05 with ten times as many elements.
+  assert.ok(all < 2 * NEAR, `${all}`);
   await picture(page, 'lamps-added');
   await restored(page);
   assert.ok(difference((await luxOf(page, before.points)).lux, before.lux) < 1e-3, 'all is undone');
