@@ -3,6 +3,7 @@
 use crate::monitor::{Monitor, Watch};
 use crate::{Error, Solution};
 use glam::DVec2;
+use radiosity_scene::elements::ElementId;
 use radiosity_scene::{Bands, Side};
 use radiosity_trace::Place;
 use radiosity_transport::{PointReceivers, Shadowing};
@@ -117,16 +118,21 @@ impl Solution<'_> {
     /// Whether any light may be hidden from a place: whether any shadow ray of its cell was stopped. Of places in the open
     /// nothing is known.
     fn may_be_shaded(&self, place: &Place) -> bool {
-        let mesh = self.tracer().mesh;
-        let triangle = place.triangle as usize;
-        if triangle >= mesh.triangles.len() {
-            return true;
-        }
-        let side = if mesh.normal(triangle).dot(place.normal) >= 0.0 { Side::Front } else { Side::Back };
-        let uv = mesh.barycentric(triangle, place.point).as_vec2();
-        self.elements.at(place.triangle, uv.x, uv.y, side).is_none_or(|element| {
+        self.element_at(place).is_none_or(|element| {
             let mut cell = self.elements.of_cell(self.elements.cell(element));
             cell.any(|e| self.columns.is_shaded(e as usize))
         })
+    }
+
+    /// The element that a place lies on; none in the open.
+    pub(crate) fn element_at(&self, place: &Place) -> Option<ElementId> {
+        let mesh = self.tracer().mesh;
+        let triangle = place.triangle as usize;
+        if triangle >= mesh.triangles.len() {
+            return None;
+        }
+        let side = if mesh.normal(triangle).dot(place.normal) >= 0.0 { Side::Front } else { Side::Back };
+        let uv = mesh.barycentric(triangle, place.point).as_vec2();
+        self.elements.at(place.triangle, uv.x, uv.y, side)
     }
 }

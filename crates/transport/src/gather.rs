@@ -28,6 +28,10 @@ pub(crate) fn near(area: f64) -> f64 {
 /// Bounces after which even near elements are looked up.
 const DEEPEST: u32 = 4;
 
+/// Share of near hits that go on as a path. What those find beyond what is looked up counts for all, so nothing is lost but
+/// a little quiet: in a furnished office a ray of a gather had two and a half segments, most of them in narrow gaps.
+const FOLLOWED: f64 = 0.5;
+
 /// Share of light samples that ignore what the element itself received, so that no light is ever missed.
 const UNGUIDED: f64 = 0.2;
 
@@ -113,11 +117,12 @@ impl Gather<'_> {
                 }
                 _ => None,
             };
-            let Some((triangle, uv, side)) = near else {
-                let value = self.values[id as usize];
-                (0..3).for_each(|band| sum[band] += throughput[band] * f64::from(value[band]));
-                return sum;
-            };
+            let value = self.values[id as usize];
+            let followed = near.filter(|_| f64::from(unit(hash(seed ^ 0x6))) < FOLLOWED);
+            let known = if followed.is_some() { 1.0 - 1.0 / FOLLOWED } else { 1.0 };
+            (0..3).for_each(|band| sum[band] += known * throughput[band] * f64::from(value[band]));
+            let Some((triangle, uv, side)) = followed else { return sum };
+            throughput.iter_mut().for_each(|t| *t /= FOLLOWED);
 
             // Go on as a path from the very spot.
             let (scene, mesh) = (self.tracer.scene, self.tracer.mesh);
