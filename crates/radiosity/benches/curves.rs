@@ -187,9 +187,11 @@ fn drawn(name: &str, curves: [(&str, &[Sample]); 2]) -> String {
             let (x, y) = (x(s.seconds), y(100.0 * s.error));
             let _ = write!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"{colour}\"/>");
         }
-        if let Some(first) = curve.first() {
-            let (x, y) = (x(first.seconds) + 10.0, y(100.0 * first.error) - 6.0);
-            let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"{colour}\">{title}</text>");
+        // Below the end: the other curve is above or to the right.
+        if let Some(last) = curve.last() {
+            let (x, y) = (x(last.seconds), y(100.0 * last.error) + 20.0);
+            let _ =
+                write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"{colour}\" text-anchor=\"middle\">{title}</text>");
         }
     }
     svg + "</svg>\n"

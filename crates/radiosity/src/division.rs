@@ -18,10 +18,10 @@ const PIECES: u32 = 4;
 /// Places in a cell that look how direct light varies, and shadow rays at each: one for each light up to this many.
 /// With one ray at each place and twelve lights, points in a furnished office are −0.30 % off instead of −0.22 %.
 const PLACES: u32 = 4;
+const RAYS: usize = 4;
+
 /// Share of a cell's rays below which a triangle is not looked at.
 const LEAST_SHARE: f64 = 0.0625;
-
-const RAYS: usize = 4;
 
 /// Optical properties by element.
 pub(crate) struct Optics {

@@ -49,8 +49,8 @@ const AIM: f64 = 0.6;
 /// Part of the error asked that an answer has for certain when more rays are a better use of time than a closer look.
 const HOPELESS: f64 = 0.8;
 
-/// Doublings of the rays that a place gets by its light, from the darkest to the brightest. With a quarter of the rays in
-/// the dark the error of all is the same in less time, but one dark place in a hundred is off by twice as much.
+/// Doublings of the rays that a place gets by its light, from the darkest to the brightest. In a furnished office at 1 %
+/// one place in a hundred is off by 14 % or more so, in 13.6 s; with a quarter of the rays in the dark by 16.5 %, in 12.3 s.
 const DOUBLINGS: [i32; 2] = [-1, 2];
 
 /// Most that the rays grow by from one round to the next.

@@ -29,7 +29,7 @@ pub(crate) fn near(area: f64) -> f64 {
 const DEEPEST: u32 = 4;
 
 /// Share of near hits that go on as a path. What those find beyond what is looked up counts for all, so nothing is lost but
-/// a little quiet: in a furnished office a ray of a gather had two and a half segments, most of them in narrow gaps.
+/// a little quiet.
 const FOLLOWED: f64 = 0.5;
 
 /// Share of light samples that ignore what the element itself received, so that no light is ever missed.

@@ -148,7 +148,7 @@ fn inverse_length(v: Vectors) -> Lanes {
     Lanes::above_zero(length, Lanes::of(1.0) / length, Lanes::of(0.0))
 }
 
-/// Four lanes of a double are one register there, and a quarter of the time.
+/// Four lanes of a double are one register there.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn avx2(four: &Four, point: DVec3, normal: DVec3) -> [f64; 4] {
