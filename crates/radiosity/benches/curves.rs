@@ -179,7 +179,7 @@ fn drawn(name: &str, curves: [(&str, &[Sample]); 2]) -> String {
             10f64.powi(k)
         );
     }
-    for ((title, curve), colour) in curves.iter().zip(["#888", "#c2410c"]) {
+    for ((_, curve), colour) in curves.iter().zip(["#888", "#c2410c"]) {
         let path: Vec<String> =
             curve.iter().map(|s| format!("{:.1} {:.1}", x(s.seconds), y(100.0 * s.error))).collect();
         let _ = write!(svg, "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>", path.join("L"));
@@ -187,13 +187,17 @@ fn drawn(name: &str, curves: [(&str, &[Sample]); 2]) -> String {
             let (x, y) = (x(s.seconds), y(100.0 * s.error));
             let _ = write!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"{colour}\"/>");
         }
-        // Below the end: the other curve is above or to the right.
-        if let Some(last) = curve.last() {
-            let (x, y) = (x(last.seconds), y(100.0 * last.error) + 20.0);
-            let _ =
-                write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"{colour}\" text-anchor=\"middle\">{title}</text>");
-        }
     }
+    // The one from above its start, the other below its end: nothing else is there.
+    let mut name = |at: Option<&Sample>, [dx, dy]: [f64; 2], colour: &str, title: &str| {
+        if let Some(s) = at {
+            let (x, y) = (x(s.seconds) + dx, y(100.0 * s.error) + dy);
+            let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"{colour}\">{title}</text>");
+        }
+    };
+    let [(first, tracer), (second, answer)] = curves;
+    name(tracer.first(), [10.0, -6.0], "#888", first);
+    name(answer.last(), [-20.0, 20.0], "#c2410c", second);
     svg + "</svg>\n"
 }
 
