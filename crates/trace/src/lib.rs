@@ -1,19 +1,22 @@
 //! Who sees whom: a tree of boxes over the scene's triangles; batches of rays in, hits out.
 //!
 //! [`Tree`] knows triangles only. [`Tracer`] adds what the scene says of them: which sides take part in the exchange
-//! of light, what is cut out, what lets light pass. [`sampling`] holds the points that rays are made from.
+//! of light, what is cut out, what lets light pass. [`sampling`] holds the points that rays are made from, and
+//! [`EmitterTree`] tells which of many emitters to send them to.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 pub mod brute;
 mod build;
 mod collapse;
+pub mod emitters;
 mod intersect;
 mod portable;
 pub mod ray;
 pub mod tree;
 
 pub use brute::{blocked_brute, closest_brute, closest_where_brute};
+pub use emitters::{Emitter, EmitterTree};
 pub use ray::{Hit, Ray};
 pub use tree::{Flaw, Tree};
 

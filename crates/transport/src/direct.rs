@@ -8,18 +8,19 @@
 //! light get its exact factor, and points near a large one, where area sampling goes wrong by factors, are as good
 //! as far ones.
 
-use crate::luminaires::{Light, MOST_EXACT_PIECES};
-use crate::one_light::{CHANCE, DARK, LIT, from_few, from_many, from_point, luminance_of, unshadowed, weigh};
+use crate::luminaires::{Light, MOST_EXACT_PIECES, Piece};
+use crate::one_light::{CHANCE, DARK, LIT, from_few, from_many, from_point, luminance_of, unshadowed};
+use crate::polygon::Four;
 use crate::{Luminaires, Progress, Receivers, Stopped};
-use radiosity_scene::Bands;
+use radiosity_scene::{Bands, luminance};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
-use radiosity_trace::{Place, Tracer};
+use radiosity_trace::{EmitterTree, Place, Tracer};
 use rayon::prelude::*;
-use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Lights of up to this many triangles have them picked by about what they give, larger ones by their power alone.
-const MOST_WEIGHED_PIECES: usize = 4096;
+/// Of a light of many triangles, so many groups of them have shadow rays of their own.
+const GROUPS: usize = 16;
 
 /// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
 /// much w varies. Fewer rays are averaged plainly, without any bias; pilots can do with the bias.
@@ -94,14 +95,30 @@ pub struct Variation {
     pub variance: f32,
 }
 
+/// What has shadow rays of its own at a place: a light, or of one with many triangles some of them.
+struct Part {
+    light: usize,
+    /// What it gives unshadowed, luminance-weighted, or a bound of that.
+    weight: f64,
+    what: What,
+}
+
+enum What {
+    Point,
+    /// Triangles whose parts are known: which they are of the light's, where their factors begin, and what they give
+    /// together, lux per band.
+    Few(Range<usize>, usize, [f64; 3]),
+    /// What is below a node of a light's tree.
+    Many(u32),
+}
+
 /// What the lights give unshadowed at one place, and the room to work it out.
 struct Unshadowed {
-    /// By light, lux per band.
-    irradiance: Vec<[f64; 3]>,
-    /// Its luminance, or something like it where it is not known without sampling.
-    weight: Vec<f64>,
-    /// By light and piece, luminance-weighted; lights of many pieces have none.
+    parts: Vec<Part>,
+    /// By triangle of those whose parts are known, luminance-weighted.
     factors: Vec<f64>,
+    /// Nodes of a tree, with bounds.
+    cut: Vec<(u32, f64)>,
     /// Shadow rays that each light has had at all places of the receiver.
     used: Vec<u32>,
     /// Result by light, lux per band.
@@ -153,7 +170,7 @@ impl Luminaires {
                     shaded[k] = scratch.outcomes & !CHANCE != LIT;
                     // Where all is lit or all is dark, what is seen from afar has the light of the whole.
                     let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
-                    let near = receivers.near(i).filter(|_| mixed || lights > shadowing.rays as usize);
+                    let near = receivers.near(i).filter(|_| mixed || scratch.parts.len() > shadowing.rays as usize);
                     let open: Vec<f64> = match near {
                         Some(near) => openness(tracer, &at, near, receivers.seed(i)),
                         None => vec![1.0; at.len()],
@@ -239,11 +256,32 @@ impl Luminaires {
         let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
         match &self.lights[light] {
             Light::Point(light) => from_point(light, tracer, place, 1, seed).0,
-            Light::Area { pieces, cumulative, .. } if pieces.len() > MOST_EXACT_PIECES => {
-                // One sample does not pay for weighing the pieces.
-                from_many((pieces, cumulative), tracer, place, (&sequence, 0, 1), seed).0
+            Light::Area { pieces, fours, tree: Some(tree), .. } => {
+                let (mut factors, mut cut) = (Vec::with_capacity(4 * GROUPS), Vec::with_capacity(GROUPS));
+                let mut groups = Vec::with_capacity(GROUPS);
+                let mut total = 0.0;
+                by_groups((pieces, fours, tree), place, &mut factors, &mut cut, |weight, what| {
+                    total += weight;
+                    groups.push((weight, what));
+                });
+                // The stream of places has no other use here.
+                let mut rest = f64::from(Sequence::new(seed, DIRECT).point(0)[0]) * total;
+                let picked = groups.iter().find(|(weight, _)| {
+                    rest -= weight;
+                    rest < 0.0
+                });
+                let Some((weight, what)) = picked.or(groups.last()) else { return [0.0; 3] };
+                let (e, _) = match what {
+                    What::Few(range, first, here) => {
+                        let own = (&pieces[range.clone()], &factors[*first..][..range.len()]);
+                        from_few(own, *here, tracer, place, (&sequence, 0, 1), (RATIO, seed))
+                    }
+                    What::Many(node) => from_many((pieces, fours, tree, *node), tracer, place, (&sequence, 0, 1), seed),
+                    What::Point => return [0.0; 3],
+                };
+                e.map(|e| e * total / weight)
             }
-            Light::Area { pieces, fours, .. } => {
+            Light::Area { pieces, fours, tree: None, .. } => {
                 let mut factors = [0.0; MOST_EXACT_PIECES];
                 let here = unshadowed((pieces, fours), place, &mut factors);
                 from_few((pieces, &factors), here, tracer, place, (&sequence, 0, 1), (RATIO, seed)).0
@@ -254,9 +292,9 @@ impl Luminaires {
     fn scratch(&self, ratio: u32) -> Unshadowed {
         let lights = self.lights.len();
         Unshadowed {
-            irradiance: vec![[0.0; 3]; lights],
-            weight: vec![0.0; lights],
+            parts: Vec::new(),
             factors: Vec::new(),
+            cut: Vec::new(),
             used: vec![0; lights],
             visible: vec![[0.0; 3]; lights],
             outcomes: 0,
@@ -298,36 +336,35 @@ impl Luminaires {
         }
     }
 
-    /// What each light would give at a place; answers the sum of their weights.
+    /// What each light would give at a place, by parts; answers the sum of their weights.
     fn unshadowed(&self, place: &Place, scratch: &mut Unshadowed) -> f64 {
-        scratch.factors.clear();
+        let Unshadowed { parts, factors, cut, .. } = scratch;
+        parts.clear();
+        factors.clear();
+        let mut total = 0.0;
+        let mut add = |light: usize, weight: f64, what: What| {
+            if weight > 0.0 {
+                total += weight;
+                parts.push(Part { light, weight, what });
+            }
+        };
         for (l, light) in self.lights.iter().enumerate() {
-            (scratch.irradiance[l], scratch.weight[l]) = match light {
+            match light {
                 Light::Point(light) => {
                     let (direction, _, arriving) = light.arrival(place.point);
-                    let e = arriving.map(|e| f64::from(e) * direction.dot(place.normal).max(0.0));
-                    (e, luminance_of(e))
+                    let cosine = direction.dot(place.normal).max(0.0);
+                    add(l, cosine * f64::from(luminance(arriving)), What::Point);
                 }
-                Light::Area { pieces, .. }
-                    if pieces.len() > MOST_EXACT_PIECES && pieces.len() <= MOST_WEIGHED_PIECES =>
-                {
-                    ([0.0; 3], weigh(pieces, place, &mut scratch.factors))
+                Light::Area { pieces, fours, tree: None, .. } => {
+                    let (weight, what) = of_few((pieces, fours), 0, place, factors);
+                    add(l, weight, what);
                 }
-                Light::Area { pieces, power, centre, radius, .. } if pieces.len() > MOST_EXACT_PIECES => {
-                    let away = *centre - place.point;
-                    let above = away.dot(place.normal) + radius > 0.0;
-                    let square = away.length_squared().max(radius * radius).max(f64::MIN_POSITIVE);
-                    ([0.0; 3], if above { power / (4.0 * PI * square) } else { 0.0 })
+                Light::Area { pieces, fours, tree: Some(tree), .. } => {
+                    by_groups((pieces, fours, tree), place, factors, cut, |weight, what| add(l, weight, what));
                 }
-                Light::Area { pieces, fours, .. } => {
-                    let first = scratch.factors.len();
-                    scratch.factors.resize(first + pieces.len(), 0.0);
-                    let e = unshadowed((pieces, fours), place, &mut scratch.factors[first..]);
-                    (e, luminance_of(e))
-                }
-            };
+            }
         }
-        scratch.weight.iter().sum()
+        total
     }
 
     /// What each light gives at a place, into `scratch.visible`; what became of the shadow rays.
@@ -344,21 +381,14 @@ impl Luminaires {
             return 0;
         }
 
-        // Deal the rays out: light l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average. Half of them go by what the lights
+        // Deal the rays out: part l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average. Half of them go by what the parts
         // would give and half to all alike, as a lamp that had a ray now and then would sparkle in sunlight.
-        let even = 0.5 * f64::from(rays) / scratch.weight.iter().filter(|w| **w > 0.0).count() as f64;
-        let (mut reached, mut first, mut outcomes) = (offset, 0, 0);
-        for (l, light) in self.lights.iter().enumerate() {
-            let known = match light {
-                Light::Area { pieces, .. } if pieces.len() <= MOST_WEIGHED_PIECES => pieces.len(),
-                _ => 0,
-            };
-            let factors = &scratch.factors[first..first + known];
-            first += known;
-            if scratch.weight[l] <= 0.0 {
-                continue;
-            }
-            let expected = 0.5 * f64::from(rays) * scratch.weight[l] / total + even;
+        let Unshadowed { parts, factors, used, visible, ratio, .. } = scratch;
+        let even = 0.5 * f64::from(rays) / parts.len() as f64;
+        let (mut reached, mut outcomes) = (offset, 0);
+        for (number, part) in parts.iter().enumerate() {
+            let l = part.light;
+            let expected = 0.5 * f64::from(rays) * part.weight / total + even;
             let before = reached.floor();
             reached += expected;
             let n = (reached.floor() - before) as u32;
@@ -366,16 +396,19 @@ impl Luminaires {
                 outcomes |= CHANCE;
                 continue;
             }
-            let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), scratch.used[l], n);
-            scratch.used[l] += n;
-            let salt = hash(seed ^ hash(index ^ hash(l as u32)));
-            let (mut e, outcome) = match light {
-                Light::Point(light) => from_point(light, tracer, place, n, salt),
-                Light::Area { pieces, .. } if pieces.len() <= MOST_EXACT_PIECES => {
-                    from_few((pieces, factors), scratch.irradiance[l], tracer, place, samples, (scratch.ratio, salt))
+            let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), used[l], n);
+            used[l] += n;
+            let salt = hash(seed ^ hash(index ^ hash(number as u32)));
+            let (mut e, outcome) = match (&self.lights[l], &part.what) {
+                (Light::Area { pieces, .. }, What::Few(range, first, here)) => {
+                    let factors = &factors[*first..][..range.len()];
+                    from_few((&pieces[range.clone()], factors), *here, tracer, place, samples, (*ratio, salt))
                 }
-                Light::Area { pieces, .. } if known > 0 => from_many((pieces, factors), tracer, place, samples, salt),
-                Light::Area { pieces, cumulative, .. } => from_many((pieces, cumulative), tracer, place, samples, salt),
+                (Light::Area { pieces, fours, tree: Some(tree), .. }, What::Many(node)) => {
+                    from_many((pieces, fours, tree, *node), tracer, place, samples, salt)
+                }
+                (Light::Point(light), _) => from_point(light, tracer, place, n, salt),
+                (Light::Area { .. }, _) => continue,
             };
             if expected < 1.0 {
                 // It came about with this probability.
@@ -383,9 +416,42 @@ impl Luminaires {
                 outcomes |= CHANCE;
             }
             outcomes |= outcome;
-            scratch.visible[l] = e;
+            (0..3).for_each(|band| visible[l][band] += e[band]);
         }
         outcomes
+    }
+}
+
+/// What triangles of a light give to a place unshadowed, the first of them being a number of the light's.
+fn of_few((pieces, fours): (&[Piece], &[Four]), number: usize, place: &Place, factors: &mut Vec<f64>) -> (f64, What) {
+    let first = factors.len();
+    factors.resize(first + pieces.len(), 0.0);
+    let e = unshadowed((pieces, fours), place, &mut factors[first..]);
+    (luminance_of(e), What::Few(number..number + pieces.len(), first, e))
+}
+
+/// Calls back with groups of the triangles of a light that could give light to a place, and what they give or could give.
+fn by_groups(
+    (pieces, fours, tree): (&[Piece], &[Four], &EmitterTree),
+    place: &Place,
+    factors: &mut Vec<f64>,
+    cut: &mut Vec<(u32, f64)>,
+    mut visit: impl FnMut(f64, What),
+) {
+    cut.clear();
+    tree.cut(place.point, place.normal, GROUPS, cut);
+    for &(node, bound) in cut.iter() {
+        let (weight, what) = match tree.leaf(node) {
+            Some(leaf) => {
+                let Range { start, end } = tree.leaves()[leaf];
+                let own = (&pieces[start as usize..end as usize], &fours[leaf..=leaf]);
+                of_few(own, start as usize, place, factors)
+            }
+            None => (bound, What::Many(node)),
+        };
+        if weight > 0.0 {
+            visit(weight, what);
+        }
     }
 }
 
@@ -411,6 +477,7 @@ mod tests {
     use crate::polygon::point_to_triangle;
     use glam::DVec3;
     use radiosity_scene::{Elements, Material, Mesh, Scene};
+    use std::f64::consts::PI;
 
     /// A floor, and lamps of 0.2 m side in a row 2 m above it that face down, each half as bright as the one before.
     fn lamps(count: u32, blocker: bool) -> Scene {

@@ -4,6 +4,7 @@
 use crate::polygon::Four;
 use glam::DVec3;
 use radiosity_scene::{AlphaMode, Bands, Elements, Mesh, PointLight, Scene, Side, luminance};
+use radiosity_trace::{Emitter, EmitterTree};
 use rayon::prelude::*;
 
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
@@ -29,8 +30,8 @@ pub struct Piece {
     pub varied: bool,
 }
 
-/// Lights with more triangles than this are sampled by area; evaluating the polygon factor of each would cost more than
-/// the shadow rays.
+/// Lights with more triangles than this have them in a tree: to evaluate the polygon factor of each would cost more
+/// than the shadow rays.
 pub(crate) const MOST_EXACT_PIECES: usize = 64;
 
 /// A source of direct light.
@@ -42,16 +43,10 @@ pub enum Light {
         name: String,
         /// Its triangles.
         pieces: Vec<Piece>,
-        /// The same by fours, where they are few.
+        /// The same by fours, or by the leaves of the tree.
         fours: Vec<Four>,
-        /// Running sum of the pieces' shares of the power, ending at 1.
-        cumulative: Vec<f64>,
-        /// Luminous flux, lm.
-        power: f64,
-        /// Centre of a ball around the light.
-        centre: DVec3,
-        /// Its radius, metres.
-        radius: f64,
+        /// The tree, where there are many; its leaves are in the order of the triangles.
+        tree: Option<EmitterTree>,
     },
     /// A source without area.
     Point(PointLight),
@@ -136,28 +131,7 @@ impl Luminaires {
         for group in pieces.chunk_by(|a, b| a.0 == b.0) {
             let name = scene.objects[group[0].0 as usize].name.clone();
             let pieces: Vec<Piece> = group.iter().map(|(_, piece)| piece.clone()).collect();
-            let mut running = 0.0;
-            let mut cumulative: Vec<f64> = pieces
-                .iter()
-                .map(|piece| {
-                    running += piece.area * f64::from(luminance(piece.exitance)).max(f64::MIN_POSITIVE);
-                    running
-                })
-                .collect();
-            cumulative.iter_mut().for_each(|c| *c /= running);
-            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            for corner in pieces.iter().flat_map(|piece| piece.corners) {
-                (low, high) = (low.min(corner), high.max(corner));
-            }
-            lights.push(Light::Area {
-                name,
-                fours: if pieces.len() > MOST_EXACT_PIECES { Vec::new() } else { by_fours(&pieces) },
-                pieces,
-                cumulative,
-                power: running,
-                centre: 0.5 * (low + high),
-                radius: 0.5 * low.distance(high),
-            });
+            lights.push(area_light(name, pieces));
         }
         lights.extend(scene.lights.iter().cloned().map(Light::Point));
         Luminaires { lights, promoted, carried }
@@ -170,9 +144,22 @@ impl Luminaires {
     }
 }
 
-fn by_fours(pieces: &[Piece]) -> Vec<Four> {
+fn area_light(name: String, mut pieces: Vec<Piece>) -> Light {
+    let tree = (pieces.len() > MOST_EXACT_PIECES).then(|| {
+        let power = |piece: &Piece| piece.area * f64::from(luminance(piece.exitance)).max(f64::MIN_POSITIVE);
+        let emitter = |piece: &Piece| Emitter::triangle(piece.corners, piece.normal, power(piece));
+        let tree = EmitterTree::new(&pieces.iter().map(emitter).collect::<Vec<_>>(), 4);
+        pieces = tree.order().iter().map(|&k| pieces[k as usize].clone()).collect();
+        tree
+    });
     let corners: Vec<[DVec3; 3]> = pieces.iter().map(|piece| piece.corners).collect();
-    corners.chunks(4).map(Four::new).collect()
+    let fours = match &tree {
+        Some(tree) => {
+            tree.leaves().iter().map(|leaf| Four::new(&corners[leaf.start as usize..leaf.end as usize])).collect()
+        }
+        None => corners.chunks(4).map(Four::new).collect(),
+    };
+    Light::Area { name, pieces, fours, tree }
 }
 
 /// Whether what a triangle gives varies over it.

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Bands, PointLight, luminance};
 use radiosity_trace::sampling::{Sequence, hash};
-use radiosity_trace::{Place, Tracer};
+use radiosity_trace::{EmitterTree, Place, Tracer};
 use std::f64::consts::PI;
 
 /// A shadow ray came through.
@@ -17,9 +17,6 @@ pub const LIT: u8 = 1;
 pub const DARK: u8 = 2;
 /// What was found would be noisy even if all shadow rays had come through.
 pub const CHANCE: u8 = 4;
-
-/// Added to the cosines by which pieces are picked: what faces away at its centre may still give a little.
-const GRAZING: f64 = 0.05;
 
 /// Luminance of a sum that is kept in double precision.
 pub fn luminance_of(e: [f64; 3]) -> f64 {
@@ -79,28 +76,12 @@ pub fn from_few(
     let mut outcome = 0;
     for index in first..first + n {
         let [u, v, _, _] = sequence.point(index);
-        // Pick a piece by its unshadowed contribution, stretching u, and a direction towards it.
-        let mut rest = f64::from(u) * total;
-        let mut k = 0;
-        while k + 1 < pieces.len() && (rest >= factors[k] || factors[k] <= 0.0) {
-            rest -= factors[k];
-            k += 1;
-        }
-        while factors[k] <= 0.0 && k > 0 {
-            k -= 1;
-            rest = factors[k];
-        }
-        let piece = &pieces[k];
-        let u = (rest / factors[k]).clamp(0.0, 1.0 - 1e-9);
-        let (target, weight) = sample_piece(piece, place, u, f64::from(v));
-        if weight <= 0.0 {
+        let Some((piece, target, weight)) = sample_one((pieces, factors), place, [u, v].map(f64::from)) else {
             continue;
-        }
-        // The weight of this sample for a source of unit exitance, over the density of having taken it.
-        let weight = weight * total / factors[k];
+        };
         let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
         outcome |= if hidden { DARK } else { LIT };
-        let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
+        let tint = tint(tracer, piece, target.point);
         for band in 0..3 {
             sampled[band] += weight * f64::from(piece.exitance[band]);
             if !hidden {
@@ -123,62 +104,67 @@ pub fn from_few(
     (irradiance, outcome)
 }
 
-/// Appends the running sum of about what each piece gives to a place, ending at 1; answers the sum, lx.
-pub fn weigh(pieces: &[Piece], place: &Place, cumulative: &mut Vec<f64>) -> f64 {
-    let first = cumulative.len();
-    let mut sum = 0.0;
-    for piece in pieces {
-        let away = piece.corners.iter().sum::<DVec3>() / 3.0 - place.point;
-        let square = away.length_squared().max(piece.area);
-        let length = square.sqrt();
-        let cosines = [place.normal.dot(away), -piece.normal.dot(away)].map(|c| (c / length).max(0.0) + GRAZING);
-        let behind = (place.point - piece.corners[0]).dot(piece.normal) <= 0.0;
-        let below = piece.corners.iter().all(|c| (*c - place.point).dot(place.normal) <= 0.0);
-        if !behind && !below {
-            let shares = cosines[0] * cosines[1] / (PI * square);
-            sum += f64::from(luminance(piece.exitance)) * piece.area * shares;
-        }
-        cumulative.push(sum);
-    }
-    if sum > 0.0 {
-        cumulative[first..].iter_mut().for_each(|c| *c /= sum);
-    }
-    sum
-}
-
-/// Irradiance of a place from a light of many triangles: picked by the running sum of their shares, sampled by area.
+/// Irradiance of a place from a light of many triangles, or those below a node of its tree: one of them for each ray, by
+/// about what each gives.
 pub fn from_many(
-    (pieces, cumulative): (&[Piece], &[f64]),
+    (pieces, fours, tree, node): (&[Piece], &[Four], &EmitterTree, u32),
     tracer: &Tracer,
     place: &Place,
     (sequence, first, n): Samples,
     salt: u32,
 ) -> ([f64; 3], u8) {
     let mut sum = [0f64; 3];
-    let mut outcome = 0;
+    let mut outcome = CHANCE;
     for index in first..first + n {
         let [u, v, _, _] = sequence.point(index);
-        let u = f64::from(u);
-        let k = cumulative.partition_point(|c| *c <= u).min(pieces.len() - 1);
-        let below = if k == 0 { 0.0 } else { cumulative[k - 1] };
-        let share = cumulative[k] - below;
-        let piece = &pieces[k];
-        let (p, q) = triangle_from_square(((u - below) / share).clamp(0.0, 1.0 - 1e-9), f64::from(v));
-        let [a, b, c] = piece.corners;
-        let target = Place { point: a + p * (b - a) + q * (c - a), normal: piece.normal, triangle: piece.triangle };
-        let weight = geometry(place, &target) * piece.area / share;
-        if weight <= 0.0 {
+        let mut u = f64::from(u);
+        let Some((leaf, probability)) = tree.pick(node, place.point, place.normal, &mut u) else { continue };
+        let range = tree.leaves()[leaf].start as usize..tree.leaves()[leaf].end as usize;
+        let mut factors = [0.0; 4];
+        let own = &pieces[range];
+        if luminance_of(unshadowed((own, &fours[leaf..=leaf]), place, &mut factors[..own.len()])) <= 0.0 {
             continue;
         }
+        let Some((piece, target, weight)) = sample_one((own, &factors[..own.len()]), place, [u, f64::from(v)]) else {
+            continue;
+        };
         if tracer.mutually_visible(place, &target, salt ^ hash(index)) {
-            let tint = if piece.varied { emission_at(tracer, piece, target.point) } else { piece.exitance };
-            (0..3).for_each(|band| sum[band] += weight * f64::from(tint[band]));
+            let tint = tint(tracer, piece, target.point);
+            (0..3).for_each(|band| sum[band] += weight / probability * f64::from(tint[band]));
             outcome |= LIT;
         } else {
             outcome |= DARK;
         }
     }
-    (sum.map(|s| s / f64::from(n)), outcome | CHANCE)
+    (sum.map(|s| s / f64::from(n)), outcome)
+}
+
+/// A piece picked by its unshadowed contribution with u, which is stretched, and a point of it by its direction; and the
+/// weight of this sample for a source of unit exitance, over the density of having taken it. None where it has none.
+fn sample_one<'p>(
+    (pieces, factors): (&'p [Piece], &[f64]),
+    place: &Place,
+    [u, v]: [f64; 2],
+) -> Option<(&'p Piece, Place, f64)> {
+    let total: f64 = factors.iter().sum();
+    let mut rest = u * total;
+    let mut k = 0;
+    while k + 1 < pieces.len() && (rest >= factors[k] || factors[k] <= 0.0) {
+        rest -= factors[k];
+        k += 1;
+    }
+    while factors[k] <= 0.0 && k > 0 {
+        k -= 1;
+        rest = factors[k];
+    }
+    let u = (rest / factors[k]).clamp(0.0, 1.0 - 1e-9);
+    let (target, weight) = sample_piece(&pieces[k], place, u, v);
+    (weight > 0.0).then(|| (&pieces[k], target, weight * total / factors[k]))
+}
+
+/// Exitance of a piece at a point of it.
+fn tint(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
+    if piece.varied { emission_at(tracer, piece, point) } else { piece.exitance }
 }
 
 /// cos θ cos θ'/(π r²) of two places, 1/m².

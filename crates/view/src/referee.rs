@@ -9,7 +9,7 @@
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, Surface, luminance};
 use radiosity_trace::sampling::{Random, Sequence, cosine_direction, frame};
-use radiosity_trace::{Found, Place, Tracer};
+use radiosity_trace::{Emitter, EmitterTree, Found, Place, Tracer};
 use std::f64::consts::PI;
 
 /// Bounces before the roulette starts.
@@ -22,19 +22,19 @@ const ALL_POINT_LIGHTS: usize = 8;
 #[derive(Clone)]
 pub struct Referee<'a> {
     tracer: &'a Tracer<'a>,
-    emitters: Vec<Emitter>,
-    /// Running power shares of the emitters.
-    cumulative: Vec<f64>,
+    emitters: Vec<Source>,
+    /// Which of them to sample.
+    tree: EmitterTree,
     /// Number of each triangle side's emitter plus one; zero for none.
     emitter_of: Vec<[u32; 2]>,
 }
 
+/// One side of a triangle that emits.
 #[derive(Clone)]
-struct Emitter {
+struct Source {
     triangle: u32,
     normal: DVec3,
     area: f64,
-    share: f64,
 }
 
 impl<'a> Referee<'a> {
@@ -42,9 +42,8 @@ impl<'a> Referee<'a> {
     pub fn new(tracer: &'a Tracer<'a>) -> Referee<'a> {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         let mut emitters = Vec::new();
-        let mut cumulative = Vec::new();
+        let mut boxes = Vec::new();
         let mut emitter_of = vec![[0u32; 2]; mesh.triangles.len()];
-        let mut running = 0.0;
         for (t, numbers) in emitter_of.iter_mut().enumerate() {
             let material = scene.material(mesh.source[t] as usize);
             if !material.emits() {
@@ -57,16 +56,13 @@ impl<'a> Referee<'a> {
                     continue;
                 }
                 let sign = if side == Side::Front { 1.0 } else { -1.0 };
-                running += power;
-                cumulative.push(running);
                 let normal = sign * mesh.normal(t);
-                emitters.push(Emitter { triangle: t as u32, normal, area: mesh.area(t), share: power });
+                boxes.push(Emitter::triangle(mesh.corners(t), normal, power));
+                emitters.push(Source { triangle: t as u32, normal, area: mesh.area(t) });
                 numbers[side as usize] = emitters.len() as u32;
             }
         }
-        cumulative.iter_mut().for_each(|c| *c /= running);
-        emitters.iter_mut().for_each(|e| e.share /= running);
-        Referee { tracer, emitters, cumulative, emitter_of }
+        Referee { tracer, emitters, tree: EmitterTree::new(&boxes, 1), emitter_of }
     }
 
     /// Irradiance (lux per band) at a place: the mean of `samples` paths. Different `seed`s are independent.
@@ -121,7 +117,8 @@ impl<'a> Referee<'a> {
             let number = self.emitter_of[triangle as usize][side as usize];
             if number > 0 {
                 let emitter = &self.emitters[number as usize - 1];
-                let weight = balance(cosine / PI, self.light_density(emitter, distance, direction));
+                let probability = self.tree.probability(number - 1, place.point, place.normal);
+                let weight = balance(cosine / PI, light_density(emitter, probability, distance, direction));
                 let luminance = self.tracer.scene.emitted_luminance(at);
                 for band in 0..3 {
                     sum[band] += throughput[band] * weight * PI * f64::from(luminance[band]);
@@ -162,20 +159,16 @@ impl<'a> Referee<'a> {
         if passes { -normal } else { normal }
     }
 
-    /// Solid-angle density with which `sample_light` would have chosen a point of an emitter.
-    fn light_density(&self, emitter: &Emitter, distance: f64, direction: DVec3) -> f64 {
-        let cosine = -direction.dot(emitter.normal);
-        if cosine <= 0.0 { 0.0 } else { emitter.share / emitter.area * distance * distance / cosine }
-    }
-
     /// Irradiance from one sampled point of the emitters, and from the lights without area.
     fn sample_light(&self, place: &Place, p: f64, q: f64, random: &mut Random) -> [f64; 3] {
         let mut sum = [0f64; 3];
-        if !self.emitters.is_empty() {
-            let k = self.cumulative.partition_point(|c| *c <= p).min(self.emitters.len() - 1);
-            let emitter = &self.emitters[k];
-            let below = if k == 0 { 0.0 } else { self.cumulative[k - 1] };
-            let stretched = ((p - below) / emitter.share).clamp(0.0, 1.0 - 1e-12);
+        let mut stretched = p;
+        let picked = match self.emitters.is_empty() {
+            true => None,
+            false => self.tree.pick(0, place.point, place.normal, &mut stretched),
+        };
+        if let Some((leaf, probability)) = picked {
+            let emitter = &self.emitters[self.tree.order()[leaf] as usize];
             let (x, y) = radiosity_scene::elements::triangle_from_square(stretched, q);
             let uv = DVec2::new(x, y);
             let mesh = self.tracer.mesh;
@@ -184,7 +177,7 @@ impl<'a> Referee<'a> {
             let distance = along.length();
             let direction = along / distance;
             let cosine = direction.dot(place.normal);
-            let density = self.light_density(emitter, distance, direction);
+            let density = light_density(emitter, probability, distance, direction);
             if distance > 0.0 && cosine > 0.0 && density > 0.0 && emitter.triangle != place.triangle {
                 let target = Place { point, normal: emitter.normal, triangle: emitter.triangle };
                 if self.tracer.mutually_visible(place, &target, random.next_bits()) {
@@ -222,6 +215,12 @@ impl<'a> Referee<'a> {
         }
         sum
     }
+}
+
+/// Solid-angle density of a point of an emitter that is picked with a probability, and sampled by area.
+fn light_density(emitter: &Source, probability: f64, distance: f64, direction: DVec3) -> f64 {
+    let cosine = -direction.dot(emitter.normal);
+    if cosine <= 0.0 { 0.0 } else { probability / emitter.area * distance * distance / cosine }
 }
 
 /// Weight of a sample taken with density `own` where the other way would have had density `other`.
