@@ -34,12 +34,16 @@ pub struct Piece {
 /// than the shadow rays.
 pub(crate) const MOST_EXACT_PIECES: usize = 64;
 
+/// More objects that emit than this are one light: what each gives to each element would fill the memory, and to
+/// look at all of them from every place would take longer than the rays.
+const MOST_LAMPS: usize = 32;
+
 /// A source of direct light.
 #[derive(Clone, Debug)]
 pub enum Light {
-    /// Emitting triangles of one object.
+    /// Emitting triangles of one object, or of all where there are more than 32.
     Area {
-        /// Name of the object.
+        /// Name of the object; empty for all of them.
         name: String,
         /// Its triangles.
         pieces: Vec<Piece>,
@@ -128,10 +132,13 @@ impl Luminaires {
         pieces.sort_by_key(|(object, _)| *object);
 
         let mut lights = Vec::new();
-        for group in pieces.chunk_by(|a, b| a.0 == b.0) {
-            let name = scene.objects[group[0].0 as usize].name.clone();
-            let pieces: Vec<Piece> = group.iter().map(|(_, piece)| piece.clone()).collect();
-            lights.push(area_light(name, pieces));
+        if pieces.chunk_by(|a, b| a.0 == b.0).count() > MOST_LAMPS {
+            lights.push(area_light(String::new(), pieces.into_iter().map(|(_, piece)| piece).collect()));
+        } else {
+            for group in pieces.chunk_by(|a, b| a.0 == b.0) {
+                let name = scene.objects[group[0].0 as usize].name.clone();
+                lights.push(area_light(name, group.iter().map(|(_, piece)| piece.clone()).collect()));
+            }
         }
         lights.extend(scene.lights.iter().cloned().map(Light::Point));
         Luminaires { lights, promoted, carried }
