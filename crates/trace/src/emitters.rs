@@ -1,7 +1,7 @@
 //! A tree of emitters: which of many to ask for light, by about what each could give to a place.
 //!
-//! A node knows a ball around its emitters, a cone around their normals, and their power. From these follows a bound of
-//! what it gives to a place that sees all of it, and a way down: to each child in proportion to its bound. What
+//! A node knows a box and a ball around its emitters, a cone around their normals, and their power. From these follows about
+//! what it gives to a place that sees all of it, and a way down: to each child in proportion to that. What
 //! cannot give anything is never asked, all else with a probability above zero. (Conty Estevez and Kulla 2018, "Importance
 //! Sampling of Many Lights with Adaptive Tree Splitting", sect. 4 and 5; bounds as in Walter et al. 2005, "Lightcuts",
 //! sect. 4.1.)
@@ -53,6 +53,9 @@ impl Cone {
         Cone { axis: (wide.axis * turn.cos() + turned.normalize() * turn.sin()).normalize(), angle }
     }
 }
+
+/// Part of the squared radius of a node by which what is in it is farther away than the nearest place of its box.
+const NEAREST: f64 = 1.0 / 64.0;
 
 /// What is below a node.
 #[derive(Clone, Copy, Debug)]
@@ -171,25 +174,28 @@ impl EmitterTree {
         }
     }
 
-    /// A bound of what a node gives to a place that sees all of it: power per area, and zero only where it gives nothing.
-    pub fn bound(&self, node: u32, point: DVec3, normal: DVec3) -> f64 {
+    /// About what a node gives to a place that sees all of it, power per area: zero only where it gives nothing.
+    pub fn importance(&self, node: u32, point: DVec3, normal: DVec3) -> f64 {
         let Node { centre, half, radius, axis, spread, power, .. } = &self.nodes[node as usize];
         let away = *centre - point;
         let height = away.dot(normal);
         if height + half.dot(normal.abs()) <= 0.0 {
             return 0.0;
         }
-        let square = away.length_squared();
-        let ball = radius * radius;
+        let (square, ball) = (away.length_squared(), radius * radius);
+        // Of what is strewn over a large box, that which is near the place counts most.
+        let nearest = (away.abs() - *half).max(DVec3::ZERO).length_squared() + NEAREST * ball;
+        let shares =
+            0.5 * power / PI * (1.0 / nearest.max(f64::MIN_POSITIVE) + 1.0 / square.max(ball).max(f64::MIN_POSITIVE));
         if square <= ball {
-            return power / (PI * ball.max(f64::MIN_POSITIVE));
+            return shares;
         }
         let distance = square.sqrt();
         // The ball is seen within this angle.
         let size = [(1.0 - ball / square).sqrt(), radius / distance];
         let seen = less(angle(height / distance), size);
         let given = less(less(angle(-away.dot(*axis) / distance), *spread), size);
-        power * seen[0].max(0.0) * given[0].max(0.0) / (PI * square)
+        shares * seen[0].max(0.0) * given[0].max(0.0)
     }
 
     /// Goes down from a node to a leaf by a number u in [0, 1), which comes out as good as new; answers the leaf and the
@@ -225,19 +231,19 @@ impl EmitterTree {
 
     /// The share of the first of two children.
     fn share(&self, node: u32, second: u32, point: DVec3, normal: DVec3) -> Option<f64> {
-        let [a, b] = [node + 1, second].map(|child| self.bound(child, point, normal));
+        let [a, b] = [node + 1, second].map(|child| self.importance(child, point, normal));
         (a + b > 0.0).then(|| a / (a + b))
     }
 
-    /// Appends nodes that together have all emitters that could give light to a place, with their bounds: up to `most`, the
+    /// Appends nodes that together have all emitters that could give light to a place, with their importance: up to `most`, the
     /// more of them the more they could give. From those of the root on, the one that could give most is replaced
     /// by its children, until it is a leaf.
     pub fn cut(&self, point: DVec3, normal: DVec3, most: usize, cut: &mut Vec<(u32, f64)>) {
         let first = cut.len();
         let add = |cut: &mut Vec<(u32, f64)>, node: u32| {
-            let bound = self.bound(node, point, normal);
-            if bound > 0.0 {
-                cut.push((node, bound));
+            let importance = self.importance(node, point, normal);
+            if importance > 0.0 {
+                cut.push((node, importance));
             }
         };
         if !self.nodes.is_empty() {
@@ -314,7 +320,7 @@ mod tests {
         }
     }
 
-    /// Whatever faces a place and is above its horizon is picked now and then, and its bound is one.
+    /// Whatever faces a place and is above its horizon is picked now and then, and is in what is cut off for it.
     #[test]
     fn nothing_that_gives_light_is_left_out() {
         let triangles = strewn(300);
@@ -352,10 +358,9 @@ mod tests {
         }
     }
 
-    /// A node's bound is at least what its emitters give from anywhere on them, once they are as large as what they give
-    /// is told to be.
+    /// What a far emitter gives is hardly more than its importance says.
     #[test]
-    fn bounds_hold() {
+    fn importance_bounds_what_far_emitters_give() {
         let triangles = strewn(64);
         let tree = tree(&triangles, 1);
         let mut random = Random::new(3);
@@ -367,13 +372,12 @@ mod tests {
                 let (corners, own) = triangles[tree.order[tree.leaves[leaf as usize].start as usize] as usize];
                 let away = corners.iter().sum::<DVec3>() / 3.0 - point;
                 let square = away.length_squared();
-                // Of far ones the distance hardly varies, and the bound takes that to the centre.
                 if square < (20.0 * node.radius).powi(2) {
                     continue;
                 }
                 let exact = node.power * away.dot(normal).max(0.0) * (-away.dot(own)).max(0.0) / (PI * square * square);
-                let bound = tree.bound(number as u32, point, normal);
-                assert!(exact <= 1.2 * bound, "{exact} beyond {bound}");
+                let importance = tree.importance(number as u32, point, normal);
+                assert!(exact <= 1.2 * importance, "{exact} beyond {importance}");
             }
         }
     }

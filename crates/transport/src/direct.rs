@@ -20,7 +20,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Of a light of many triangles, so many groups of them have shadow rays of their own.
-const GROUPS: usize = 16;
+const GROUPS: usize = 24;
 
 /// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
 /// much w varies. Fewer rays are averaged plainly, without any bias; pilots can do with the bias.
@@ -98,7 +98,7 @@ pub struct Variation {
 /// What has shadow rays of its own at a place: a light, or of one with many triangles some of them.
 struct Part {
     light: usize,
-    /// What it gives unshadowed, luminance-weighted, or a bound of that.
+    /// What it gives unshadowed, luminance-weighted, or about that.
     weight: f64,
     what: What,
 }
@@ -117,7 +117,7 @@ struct Unshadowed {
     parts: Vec<Part>,
     /// By triangle of those whose parts are known, luminance-weighted.
     factors: Vec<f64>,
-    /// Nodes of a tree, with bounds.
+    /// Nodes of a tree, with their importance.
     cut: Vec<(u32, f64)>,
     /// Shadow rays that each light has had at all places of the receiver.
     used: Vec<u32>,
@@ -440,14 +440,14 @@ fn by_groups(
 ) {
     cut.clear();
     tree.cut(place.point, place.normal, GROUPS, cut);
-    for &(node, bound) in cut.iter() {
+    for &(node, importance) in cut.iter() {
         let (weight, what) = match tree.leaf(node) {
             Some(leaf) => {
                 let Range { start, end } = tree.leaves()[leaf];
                 let own = (&pieces[start as usize..end as usize], &fours[leaf..=leaf]);
                 of_few(own, start as usize, place, factors)
             }
-            None => (bound, What::Many(node)),
+            None => (importance, What::Many(node)),
         };
         if weight > 0.0 {
             visit(weight, what);
