@@ -42,9 +42,11 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
         ["--test", names @ ..] => {
             install(&viewer)?;
             let browser = browser()?;
+            // The program that its own tests run: nothing is compiled where `cargo test --workspace` has been. Built by itself it
+            // would have fewer features of its dependencies, and all of them would be compiled again.
             let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
             let mut build = Command::new(cargo);
-            run(build.current_dir(&root).args(["build", "--locked", "--package", "radiosity-cli"]))?;
+            run(build.current_dir(&root).args(["test", "--locked", "--workspace", "--test", "cli", "--no-run"]))?;
             let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
             let mut tests = Command::new("node");
             tests.current_dir(&viewer).args(["--test", "--test-concurrency=1"]);

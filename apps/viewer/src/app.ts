@@ -23,9 +23,6 @@ const GESTURE = 40;
 
 const WRAPS = { repeat: RepeatWrapping, mirror: MirroredRepeatWrapping, clamp: ClampToEdgeWrapping } as const;
 
-/** How a refusal begins that is about the layer that is shown, and not about what was changed. */
-const OF_LAYERS = /^Pages look at/;
-
 /** What was measured at a point, and where it is. */
 export interface Probed {
   hit: Hit;
@@ -177,8 +174,9 @@ export class App {
         break;
       case 'refused':
         this.say(notice.message);
-        if (OF_LAYERS.test(notice.message)) this.rest(notice.message);
-        else this.takeBack();
+        if (notice.code === 'layer') this.rest(notice.message);
+        // A message that could not be read may have been a change.
+        else if (notice.code !== 'camera') this.takeBack();
         break;
     }
   }

@@ -69,6 +69,8 @@ export interface LightNotice {
 export interface StatusNotice {
   kind: 'status';
   doing: string;
+  /** Whether an edit is not seen yet. */
+  is_following: boolean;
   rays: number;
   most_rays: number;
   /** Relative error of irradiance, estimated; none before there is one. */
@@ -103,6 +105,14 @@ export interface ProbeAnswer {
   surfaces: Share[];
 }
 
+/** What was refused: a change of the scene, a camera to keep, to follow changes in the layer that is shown, or a message
+ *  that is none. The message is for people. */
+export interface RefusedNotice {
+  kind: 'refused';
+  code: 'edit' | 'camera' | 'layer' | 'message';
+  message: string;
+}
+
 /** Everything that the server says in JSON. */
 export type Notice =
   | SceneNotice
@@ -114,7 +124,7 @@ export type Notice =
   | { kind: 'caught_up' }
   | { kind: 'probe'; question: number; answer: ProbeAnswer | null }
   | { kind: 'rays'; question: number; rays: number[][][] }
-  | { kind: 'refused'; message: string };
+  | RefusedNotice;
 
 /** What a layer shows. */
 export type Layer = 'total' | 'direct' | 'indirect' | 'error' | { bounce: number } | { light: number };

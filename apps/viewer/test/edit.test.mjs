@@ -2,22 +2,13 @@
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { after, before, test } from 'node:test';
-import { browser, compared, difference, done, folder, luxOf, NEAR, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
+import { test } from 'node:test';
+import { started } from './fixture.mjs';
+import { compared, difference, done, folder, luxOf, NEAR, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
 import { shown } from './display.mjs';
 import { studio } from './studio.mjs';
 
-let program;
-let pages;
-
-before(async () => {
-  [program, pages] = await Promise.all([view(...SMALL), browser()]);
-});
-
-after(async () => {
-  await pages.close();
-  await program.end();
-});
+const { program, pages } = await started();
 
 const named = async (page, name) => (await state(page)).objects.find((object) => object.name === name && !object.deleted);
 

@@ -1,19 +1,10 @@
 // The page without a mouse.
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { browser, done, picture, restored, SMALL, state, view } from './program.mjs';
+import { test } from 'node:test';
+import { started } from './fixture.mjs';
+import { done, picture, restored, state } from './program.mjs';
 
-let program;
-let pages;
-
-before(async () => {
-  [program, pages] = await Promise.all([view(...SMALL), browser()]);
-});
-
-after(async () => {
-  await pages.close();
-  await program.end();
-});
+const { program, pages } = await started();
 
 test('everything is reached by keyboard alone', async () => {
   const page = await pages.open(program.url);

@@ -1,19 +1,10 @@
 // The page in a browser, against the program.
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { browser, caughtUp, compared, done, luxOf, NEAR, picture, restored, SMALL, state, stuck, view } from './program.mjs';
+import { test } from 'node:test';
+import { started } from './fixture.mjs';
+import { caughtUp, compared, done, luxOf, NEAR, picture, restored, state, stuck } from './program.mjs';
 
-let program;
-let pages;
-
-before(async () => {
-  [program, pages] = await Promise.all([view(...SMALL), browser()]);
-});
-
-after(async () => {
-  await pages.close();
-  assert.equal(await program.end(), 0, 'Ctrl-C ends it with 0');
-});
+const { program, pages } = await started();
 
 /** Seconds to the whole scene, from the beginning of the page: the least of three, since others use this machine too. People are
  *  promised one, with graphics hardware; here the processor draws, and as much again is for that. Measured: 0.7 to 1.1. */

@@ -27,6 +27,8 @@ export const NEAR = 0.05;
 export async function view(...options) {
   const program = spawn(radiosity, ['view', '--json', '--no-open', ...options], { stdio: ['ignore', 'pipe', 'inherit'] });
   const ended = new Promise((done) => program.on('close', done));
+  // However the tests end.
+  process.on('exit', () => program.kill('SIGKILL'));
   const url = await new Promise((found, failed) => {
     createInterface(program.stdout).on('line', (line) => {
       const event = JSON.parse(line);

@@ -8,7 +8,7 @@ use radiosity::session::{
     SessionOptions,
 };
 use radiosity::{
-    Bands, Material, Mesh, Scene, Side, Solution, SolveOptions, Surface, Texture, TextureRef, Tracer, cornell_box,
+    Bands, Material, Mesh, PointLight, Scene, Side, Solution, SolveOptions, Surface, Texture, TextureRef, Tracer, cornell_box,
     luminance,
 };
 use radiosity_trace::sampling::Random;
@@ -70,12 +70,16 @@ impl Dice {
         (glam::DMat4::from_translation(shift) * turn).to_cols_array()
     }
 
-    fn light(&mut self, reach: f64) -> NewLight {
-        let kind = match self.below(3) {
+    fn kind(&mut self) -> NewLightKind {
+        match self.below(3) {
             0 => NewLightKind::Point,
-            1 => NewLightKind::Spot { inner: 0.2, outer: 0.7 },
+            1 => NewLightKind::Spot { inner: self.between(0.0, 0.5), outer: 0.7 },
             _ => NewLightKind::Directional,
-        };
+        }
+    }
+
+    fn light(&mut self, reach: f64) -> NewLight {
+        let kind = self.kind();
         let at = [(); 3].map(|()| self.between(0.0, reach));
         let direction = [self.between(-1.0, 1.0), -1.0, self.between(-1.0, 1.0)];
         NewLight { name: "added".to_owned(), kind, position: at, direction, intensity: [50.0, 40.0, 30.0] }
@@ -85,7 +89,9 @@ impl Dice {
         let model = session.model();
         let object = ObjectId(self.below(model.objects.len()) as u32);
         let light = LightId(self.below(model.lights.len()) as u32);
-        match self.below(12) {
+        // Of lights without area, as most are refused to others.
+        let lamp = model.lights.iter().rfind(|light| light.intensity.is_some()).map_or(light, |light| light.id);
+        match self.below(13) {
             0 | 1 => Edit::Light {
                 light,
                 dimming: if self.below(4) == 0 { 0.0 } else { self.between(0.0, 2.0) as f32 },
@@ -101,6 +107,10 @@ impl Dice {
                 Some(deleted) if self.below(2) == 0 => Edit::RestoreLight { light: deleted.id },
                 _ => Edit::DeleteLight { light },
             },
+            11 => {
+                let intensity = [self.between(0.0, 100.0) as f32, 40.0, 0.0];
+                Edit::ChangeLight { light: lamp, kind: self.kind(), intensity }
+            }
             _ => match model.objects.iter().find(|object| object.deleted) {
                 Some(deleted) if self.below(2) == 0 => Edit::Restore { object: deleted.id },
                 _ => Edit::Delete { object },
@@ -154,6 +164,102 @@ fn catalogue_77_random_edits_of_the_cornell_box() {
 #[test]
 fn catalogue_77_random_edits_of_a_furnished_room() {
     random_edits(&furnished(), &small(), 1.0, 100..108);
+}
+
+/// The scene of a lamp of a kind, straight from a file: what [`Edit::ChangeLight`] is to lead to.
+fn with_lamps(kinds: &[(NewLightKind, Bands)]) -> Scene {
+    let mut scene = cornell_box();
+    scene.lights.extend(kinds.iter().enumerate().map(|(k, (kind, intensity))| PointLight {
+        name: format!("lamp {k}"),
+        kind: (*kind).into(),
+        position: glam::DVec3::new(0.15 + 0.1 * k as f64, 0.4, 0.2),
+        direction: glam::DVec3::new(0.3, -1.0, -0.2).normalize(),
+        intensity: *intensity,
+        range: None,
+    }));
+    scene
+}
+
+/// Lamps of each kind become each other kind, brighter or darker: their light is, to the last bit, that of a session which
+/// opens the edited scene, and it is taken back to the last bit.
+#[test]
+fn catalogue_77_a_changed_lamp_is_one_that_was_always_so() {
+    let spot = NewLightKind::Spot { inner: 0.2, outer: 0.6 };
+    let narrow = NewLightKind::Spot { inner: 0.0, outer: 0.25 };
+    let from = [
+        (NewLightKind::Point, [5.0, 4.0, 3.0]),
+        (spot, [9.0; 3]),
+        (NewLightKind::Directional, [40.0, 40.0, 60.0]),
+        (spot, [2.0, 3.0, 4.0]),
+    ];
+    let to = [
+        (spot, [9.0, 0.0, 3.0]),
+        (NewLightKind::Directional, [70.0, 60.0, 50.0]),
+        (NewLightKind::Point, [3.0; 3]),
+        (narrow, [6.0, 3.0, 4.0]),
+    ];
+    let mut session = Session::new(with_lamps(&from), &small()).unwrap();
+    finish(&mut session);
+    let before = bits(&session);
+    // The Cornell box's own lamp is light 0.
+    let change = |k: usize, (kind, intensity): (NewLightKind, Bands)| Edit::ChangeLight {
+        light: LightId(k as u32 + 1),
+        kind,
+        intensity,
+    };
+    let edits: Vec<Edit> = to.iter().enumerate().map(|(k, to)| change(k, *to)).collect();
+    let mut inverse = Vec::new();
+    for edit in &edits {
+        let applied = session.apply(edit).unwrap();
+        assert!(applied.added_lights.is_empty() && applied.objects.is_empty());
+        inverse.push(applied.inverse);
+        session.step(Duration::from_millis(1));
+    }
+    assert_eq!(inverse, from.iter().enumerate().map(|(k, from)| change(k, *from)).collect::<Vec<_>>());
+    let lights = session.model().lights;
+    assert_eq!(lights.iter().map(|light| light.kind).collect::<Vec<_>>(), [
+        LightKind::Object,
+        LightKind::Spot,
+        LightKind::Directional,
+        LightKind::Point,
+        LightKind::Spot
+    ]);
+    assert_eq!((lights[4].cone, lights[4].intensity), (Some([0.0, 0.25]), Some([6.0, 3.0, 4.0])));
+    assert_eq!((lights[0].cone, lights[0].intensity), (None, None));
+    finish(&mut session);
+    let changed = bits(&session);
+    assert_eq!(session.edited_scene().lights, with_lamps(&to).lights);
+    for scene in [with_lamps(&to), session.edited_scene()] {
+        let mut fresh = Session::new(scene, &small()).unwrap();
+        finish(&mut fresh);
+        let fresh = bits(&fresh);
+        let differ = changed.iter().zip(&fresh).filter(|(a, b)| a != b).count();
+        assert!(changed == fresh, "{differ} of {} numbers differ", fresh.len());
+    }
+    assert!(changed != before);
+    for edit in inverse.iter().rev() {
+        session.apply(edit).unwrap();
+    }
+    finish(&mut session);
+    assert!(bits(&session) == before);
+
+    // What no light can be is refused, and what has an area.
+    let lamp = |kind, intensity| Edit::ChangeLight { light: LightId(1), kind, intensity };
+    for wrong in [
+        lamp(NewLightKind::Point, [-1.0, 0.0, 0.0]),
+        lamp(NewLightKind::Point, [f32::NAN; 3]),
+        lamp(NewLightKind::Point, [1e13; 3]),
+        lamp(NewLightKind::Spot { inner: 0.7, outer: 0.6 }, [1.0; 3]),
+        lamp(NewLightKind::Spot { inner: 0.0, outer: 2.0 }, [1.0; 3]),
+        lamp(NewLightKind::Spot { inner: f64::NAN, outer: 0.5 }, [1.0; 3]),
+    ] {
+        assert!(matches!(session.apply(&wrong), Err(EditError::ChangeLight { light: LightId(1), .. })), "{wrong:?}");
+    }
+    let of = |light| Edit::ChangeLight { light, kind: NewLightKind::Point, intensity: [1.0; 3] };
+    assert_eq!(session.apply(&of(LightId(0))), Err(EditError::NotPlaceable(LightId(0))), "an object that shines");
+    assert_eq!(session.apply(&of(LightId(9))), Err(EditError::UnknownLight(LightId(9))));
+    session.apply(&Edit::DeleteLight { light: LightId(1) }).unwrap();
+    assert_eq!(session.apply(&of(LightId(1))), Err(EditError::DeletedLight(LightId(1))));
 }
 
 #[test]
@@ -308,7 +414,7 @@ fn lights_without_area_come_and_go() {
     refused(&|light| light.position[1] = 1e6);
     refused(&|light| light.direction[0] = f64::INFINITY);
     refused(&|light| light.intensity[2] = -1.0);
-    refused(&|light| light.intensity[2] = 1e10);
+    refused(&|light| light.intensity[2] = 1e13);
     refused(&|light| light.kind = NewLightKind::Spot { inner: 0.7, outer: 0.6 });
     refused(&|light| light.kind = NewLightKind::Spot { inner: 0.0, outer: 2.0 });
     refused(&|light| light.name = "x".repeat(201));

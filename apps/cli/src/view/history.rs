@@ -79,6 +79,7 @@ pub enum Target {
     Presence(ObjectId),
     Light(LightId),
     LightPlace(LightId),
+    LightShape(LightId),
     LightPresence(LightId),
     NewLight,
 }
@@ -88,6 +89,7 @@ pub fn targets(edit: &Edit) -> Vec<Target> {
     match edit {
         Edit::Light { light, .. } => vec![Target::Light(*light)],
         Edit::MoveLight { light, .. } => vec![Target::LightPlace(*light)],
+        Edit::ChangeLight { light, .. } => vec![Target::LightShape(*light)],
         Edit::AddLight { .. } => vec![Target::NewLight],
         Edit::CopyLight { light, .. } | Edit::DeleteLight { light } | Edit::RestoreLight { light } => {
             vec![Target::LightPresence(*light)]
@@ -114,6 +116,7 @@ pub fn label(edit: &Edit, model: &Model) -> String {
     match edit {
         Edit::Light { light: id, .. } => format!("dim {}", light(id)),
         Edit::MoveLight { light: id, .. } => format!("move {}", light(id)),
+        Edit::ChangeLight { light: id, .. } => format!("change {}", light(id)),
         Edit::AddLight { light } if light.name.is_empty() => "add a light".to_owned(),
         Edit::AddLight { light } => format!("add {}", light.name),
         Edit::CopyLight { light: id, .. } => format!("duplicate {}", light(id)),

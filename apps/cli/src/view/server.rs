@@ -4,7 +4,7 @@ use super::board::{Board, MOST_LAYERS, Notice, Seen};
 use super::files;
 use super::guard::{Guard, Refusal};
 use super::solver::{Command, Export};
-use super::wire::{self, LONGEST, Request, Say};
+use super::wire::{self, LONGEST, Refused, Request, Say};
 use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
@@ -208,7 +208,7 @@ impl Watch {
         let message = format!(
             "Pages look at more than {MOST_LAYERS} different layers of light; this one stays as it is until one of them is left."
         );
-        is_news.then(|| Say::Refused { message }.text())
+        is_news.then(|| Say::Refused { code: Refused::Layer, message }.text())
     }
 }
 
@@ -326,7 +326,7 @@ async fn receive(
 fn refuse(answer: &mpsc::Sender<String>, what: &str) -> bool {
     let message = format!("The server could not read a message: {what}.");
     // A page that does not read its answers misses them.
-    let _ = answer.try_send(Say::Refused { message }.text());
+    let _ = answer.try_send(Say::Refused { code: Refused::Message, message }.text());
     true
 }
 

@@ -2,7 +2,7 @@
 
 use super::board::{Board, Notice, Subject};
 use super::history::{self, Gesture, History, targets};
-use super::wire::{self, CameraPlace, ProbeAnswer, Request, Say, Share};
+use super::wire::{self, CameraPlace, ProbeAnswer, Refused, Request, Say, Share};
 use radiosity::session::{Edit, EditError, Layer, LightKind, Model, ObjectId, Probe, Session};
 use radiosity::{Bands, Scene, luminance};
 use std::collections::BTreeSet;
@@ -200,7 +200,7 @@ impl Solver {
                     self.post_history();
                     None
                 }
-                Err(error) => Some(refusal(format!("Not changed: {error}."))),
+                Err(error) => Some(unchanged(&error)),
             },
             Request::Undo | Request::Redo => {
                 let is_undo = *request == Request::Undo;
@@ -209,7 +209,7 @@ impl Solver {
                 match self.apply(&edit, since) {
                     Ok(inverse) if is_undo => self.history.undid(inverse),
                     Ok(inverse) => self.history.redid(inverse),
-                    Err(error) => return Some(refusal(format!("Not changed: {error}."))),
+                    Err(error) => return Some(unchanged(&error)),
                 }
                 self.post_history();
                 None
@@ -250,12 +250,12 @@ impl Solver {
             && (0.01..3.1).contains(&camera.fov)
             && (1..=LONGEST_NAME).contains(&camera.name.chars().count());
         if !is_sound {
-            return Some(refusal("Not kept: the camera or its name is none.".to_owned()));
+            return Some(not_kept("the camera or its name is none"));
         }
         match self.cameras.iter().position(|kept| kept.name == camera.name) {
             Some(kept) => self.cameras[kept] = camera.clone(),
             None if self.cameras.len() == MOST_CAMERAS => {
-                return Some(refusal(format!("Not kept: there are {MOST_CAMERAS} cameras; forget one first.")));
+                return Some(not_kept(&format!("there are {MOST_CAMERAS} cameras; forget one first")));
             }
             None => self.cameras.push(camera.clone()),
         }
@@ -400,6 +400,7 @@ impl Solver {
         };
         let status = wire::Status {
             doing,
+            is_following: self.edited.is_some(),
             rays: status.rays,
             most_rays: status.most_rays,
             error: Some(status.error).filter(|error| error.is_finite()),
@@ -478,6 +479,12 @@ fn shares(named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
     shares
 }
 
-fn refusal(message: String) -> String {
-    Say::Refused { message }.text()
+/// An edit that was refused.
+fn unchanged(error: &EditError) -> String {
+    Say::Refused { code: Refused::Edit, message: format!("Not changed: {error}.") }.text()
+}
+
+/// A camera that was refused.
+fn not_kept(why: &str) -> String {
+    Say::Refused { code: Refused::Camera, message: format!("Not kept: {why}.") }.text()
 }

@@ -114,6 +114,10 @@ pub enum Say<'a> {
         r#type: radiosity::session::LightKind,
         dimming: f32,
         colour: Bands,
+        /// Candela, or lux of parallel light, before it is dimmed and coloured; none with area.
+        intensity: Option<Bands>,
+        /// Half angles of a spot, radians.
+        cone: Option<[f64; 2]>,
         matrix: [f64; 16],
         position: Option<[f64; 3]>,
         object: Option<ObjectId>,
@@ -138,8 +142,23 @@ pub enum Say<'a> {
         rays: Vec<[[f32; 3]; 2]>,
     },
     Refused {
+        code: Refused,
         message: String,
     },
+}
+
+/// What was refused, for the page; the message beside it is for people.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refused {
+    /// A change: the scene is as it was.
+    Edit,
+    /// A camera to keep.
+    Camera,
+    /// To follow changes in the layer that is shown: it stays as it is.
+    Layer,
+    /// A message that is none.
+    Message,
 }
 
 impl Say<'_> {
@@ -154,6 +173,8 @@ impl Say<'_> {
 #[derive(Clone, Debug, Serialize)]
 pub struct Status {
     pub doing: String,
+    /// Whether an edit is not seen yet.
+    pub is_following: bool,
     pub rays: u32,
     pub most_rays: u32,
     pub error: Option<f64>,
@@ -267,6 +288,8 @@ pub fn light(light: &ModelLight) -> String {
         r#type: light.kind,
         dimming: light.dimming,
         colour: light.colour,
+        intensity: light.intensity,
+        cone: light.cone,
         matrix: light.matrix,
         position: light.position,
         object: light.object,
@@ -378,6 +401,8 @@ mod tests {
             format!(r#"{{"add_light":{{"light":{spot}}}}}"#),
             r#"{"add_light":{"light":{"name":"sun","kind":"directional","intensity":[9,9,9]}}}"#.to_owned(),
             format!(r#"{{"copy_light":{{"light":3,"matrix":{matrix}}}}}"#),
+            r#"{"change_light":{"light":3,"kind":{"spot":{"inner":0.3,"outer":0.6}},"intensity":[9,9,9]}}"#.to_owned(),
+            r#"{"change_light":{"light":3,"kind":"point","intensity":[9,9,9]}}"#.to_owned(),
             r#"{"delete_light":{"light":3}}"#.to_owned(),
             r#"{"restore_light":{"light":3}}"#.to_owned(),
         ] {
@@ -395,11 +420,26 @@ mod tests {
             r#"{"kind":"edit","edit":{"light":{"light":0,"dimming":1e999,"colour":[1,1,1]}}}"#,
             r#"{"kind":"edit","edit":{"add_light":{"light":{"kind":"laser","intensity":[9,9,9]}}}}"#,
             r#"{"kind":"edit","edit":{"add_light":{"light":{"kind":"point","intensity":[9,9,9],"extra":1}}}}"#,
+            r#"{"kind":"edit","edit":{"change_light":{"light":3,"kind":"sky","intensity":[9,9,9]}}}"#,
+            r#"{"kind":"edit","edit":{"change_light":{"light":3,"kind":"point","intensity":[9,9]}}}"#,
             r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1]}"#,
             r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1,0.2],"extra":1}"#,
             &deep,
         ] {
             assert!(serde_json::from_str::<Request>(wrong).is_err(), "{}", &wrong[..wrong.len().min(80)]);
+        }
+    }
+
+    #[test]
+    fn refusals_have_codes() {
+        let text = |code| Say::Refused { code, message: "Why.".to_owned() }.text();
+        for (code, name) in [
+            (Refused::Edit, "edit"),
+            (Refused::Camera, "camera"),
+            (Refused::Layer, "layer"),
+            (Refused::Message, "message"),
+        ] {
+            assert_eq!(text(code), format!(r#"{{"kind":"refused","code":"{name}","message":"Why."}}"#));
         }
     }
 

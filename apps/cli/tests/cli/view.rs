@@ -183,11 +183,20 @@ fn malformed_messages_are_refused_and_the_next_is_heard() {
     let name = socket.hear_of("scene")["name"].clone();
     socket.hear_of("caught_up");
     let deep = "[".repeat(100_000);
-    for wrong in
-        ["", "{", "\u{0}", r#"{"kind":"nothing"}"#, r#"{"kind":"edit","edit":{"delete":{"object":77777}}}"#, &deep]
-    {
+    let nameless = r#"{"kind":"bookmark","camera":{"name":"","matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"fov":1}}"#;
+    for (wrong, code) in [
+        ("", "message"),
+        ("{", "message"),
+        ("\u{0}", "message"),
+        (r#"{"kind":"nothing"}"#, "message"),
+        (r#"{"kind":"edit","edit":{"delete":{"object":77777}}}"#, "edit"),
+        (nameless, "camera"),
+        (&deep, "message"),
+    ] {
         socket.say(wrong);
-        assert!(!socket.hear_of("refused")["message"].as_str().unwrap().is_empty());
+        let refused = socket.hear_of("refused");
+        assert_eq!(refused["code"], code, "{refused}");
+        assert!(!refused["message"].as_str().unwrap().is_empty());
     }
     // Longer than any message may be: this connection ends, others do not notice.
     let mut other = served.socket();

@@ -1,7 +1,7 @@
 //! What may be changed in a scene that is being watched, and why a change is refused.
 
 use crate::session::{LightId, ObjectId};
-use radiosity_scene::Bands;
+use radiosity_scene::{Bands, PointLightKind};
 use serde::{Deserialize, Serialize};
 
 /// Most by which a light may be turned up.
@@ -13,8 +13,11 @@ pub const MOST_EDITS: usize = 4096;
 /// Most lights of a session, those that were taken away counted: numbers are never given anew.
 pub const MOST_LIGHTS: usize = 4096;
 
-/// Most intensity of a light that is added, cd or lx: ten thousand suns.
-pub const MOST_INTENSITY: f32 = 1e9;
+/// Most intensity of a light that is added or changed, cd or lx: what files may have, so that every change can be taken back.
+pub const MOST_INTENSITY: f32 = 1e12;
+
+/// Largest half angle of a spot, radians: a right angle, with the rounding that files may have.
+pub const MOST_CONE: f64 = std::f64::consts::FRAC_PI_2 + 1e-9;
 
 /// A light without area that is to be added.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,7 +38,7 @@ pub struct NewLight {
     pub intensity: Bands,
 }
 
-/// Kinds of lights that may be added.
+/// Kinds of lights without area.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NewLightKind {
@@ -50,6 +53,26 @@ pub enum NewLightKind {
     },
     /// Parallel light.
     Directional,
+}
+
+impl From<NewLightKind> for PointLightKind {
+    fn from(kind: NewLightKind) -> Self {
+        match kind {
+            NewLightKind::Point => PointLightKind::Point,
+            NewLightKind::Spot { inner, outer } => PointLightKind::Spot { inner, outer },
+            NewLightKind::Directional => PointLightKind::Directional,
+        }
+    }
+}
+
+impl From<PointLightKind> for NewLightKind {
+    fn from(kind: PointLightKind) -> Self {
+        match kind {
+            PointLightKind::Point => NewLightKind::Point,
+            PointLightKind::Spot { inner, outer } => NewLightKind::Spot { inner, outer },
+            PointLightKind::Directional => NewLightKind::Directional,
+        }
+    }
 }
 
 /// A change of the scene. Matrices are by columns and carry the object as the file places it, in world coordinates, to
@@ -91,6 +114,15 @@ pub enum Edit {
     AddLight {
         /// The light.
         light: NewLight,
+    },
+    /// Makes a light without area one of another kind, cone or intensity. It stays where it is, dimmed and coloured as it is.
+    ChangeLight {
+        /// The light: point, spot or directional.
+        light: LightId,
+        /// Its kind from now on.
+        kind: NewLightKind,
+        /// Candela per band, or lux per band of parallel light, before it is dimmed and coloured.
+        intensity: Bands,
     },
     /// Adds a copy of a light without area, dimmed and coloured alike.
     CopyLight {
@@ -199,7 +231,7 @@ pub enum EditError {
         most: f64,
     },
     /// The light has no place of its own.
-    #[error("light {} cannot be placed, copied or deleted by itself: it is the sky, or an object that shines (do it to that)", .0.0)]
+    #[error("light {} cannot be placed, changed, copied or deleted by itself: it is the sky, or an object that shines (do it to that)", .0.0)]
     NotPlaceable(LightId),
     /// The light was taken away before.
     #[error("light {} has been deleted (restore it first)", .0.0)]
@@ -210,6 +242,14 @@ pub enum EditError {
     /// A light that cannot be added.
     #[error("the light cannot be added: {0}")]
     NewLight(&'static str),
+    /// What a light cannot be made.
+    #[error("light {} cannot be so: {why}", light.0)]
+    ChangeLight {
+        /// The light.
+        light: LightId,
+        /// What is wrong.
+        why: &'static str,
+    },
     /// There are lights enough.
     #[error("there are {MOST_LIGHTS} lights already, with those that were deleted; no more can be added")]
     TooManyLights,

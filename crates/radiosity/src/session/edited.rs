@@ -1,12 +1,14 @@
 //! Edits are checked as a whole, then carried out; and the scene as they leave it.
 
-use super::edit::{Edit, EditError, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind};
-use super::light::Light;
+use super::edit::{
+    Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
+};
+use super::light::{Light, kind_of};
 use super::paint::brighter;
 use super::{LightId, MOST_COLUMNS, ObjectId, Session, bytes};
 use glam::{DAffine3, DMat4, DVec3};
 use radiosity_scene::material::MAX_REFLECTANCE;
-use radiosity_scene::{PointLight, PointLightKind, Scene, Sky, Source};
+use radiosity_scene::{Bands, PointLight, Scene, Sky, Source};
 use radiosity_transport::live::REACH;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -107,6 +109,10 @@ impl Session {
                 lit(*light, known)?;
                 check_matrix(matrix)?;
             }
+            Edit::ChangeLight { light, kind, intensity } => {
+                lit(*light, known)?;
+                check_lamp(*kind, intensity).map_err(|why| EditError::ChangeLight { light: *light, why })?;
+            }
             Edit::AddLight { light } => {
                 self.check_light(light)?;
                 self.check_more(known, 0, Some(KnownLight { has_area: false, is_gone: false }))?;
@@ -178,21 +184,11 @@ impl Session {
         if light.position.iter().chain(&light.direction).any(|x| !x.is_finite()) {
             return refuse("its position or direction has a number that is not finite");
         }
-        if light.intensity.iter().any(|x| !(0.0..=MOST_INTENSITY).contains(x)) {
-            return refuse("its intensity is negative, above 1e9 or no number");
-        }
         let distance = (DVec3::from(light.position) - world.middle).abs().max_element();
         if light.kind != NewLightKind::Directional && distance > REACH * world.half {
             return refuse("it would be too far from the middle of the scene");
         }
-        match light.kind {
-            NewLightKind::Spot { inner, outer }
-                if !(inner >= 0.0 && inner <= outer && outer > 0.0 && outer <= std::f64::consts::FRAC_PI_2) =>
-            {
-                refuse("the half angles of a spot are 0 or more, the outer one no less than the inner and at most π/2")
-            }
-            _ => Ok(()),
-        }
+        check_lamp(light.kind, &light.intensity).or_else(refuse)
     }
 
     fn check_place(&self, object: ObjectId, source: usize, matrix: &[f64; 16]) -> Result<(), EditError> {
@@ -242,16 +238,21 @@ impl Session {
                 done.traces = true;
                 Edit::MoveLight { light: *light, matrix: before }
             }
+            Edit::ChangeLight { light, kind, intensity } => {
+                let own = &mut self.lights[light.0 as usize];
+                let point = own.point.as_mut().expect("lights without area alone are changed: that was checked");
+                let inverse = Edit::ChangeLight { light: *light, kind: point.kind.into(), intensity: point.intensity };
+                (point.kind, point.intensity) = ((*kind).into(), *intensity);
+                own.kind = kind_of(point);
+                done.strands.insert(own.strand);
+                done.traces = true;
+                inverse
+            }
             Edit::AddLight { light } => {
-                let kind = match light.kind {
-                    NewLightKind::Point => PointLightKind::Point,
-                    NewLightKind::Spot { inner, outer } => PointLightKind::Spot { inner, outer },
-                    NewLightKind::Directional => PointLightKind::Directional,
-                };
                 let down = -self.scene.up.direction();
                 let point = PointLight {
                     name: light.name.clone(),
-                    kind,
+                    kind: light.kind.into(),
                     position: light.position.into(),
                     direction: DVec3::from(light.direction).try_normalize().unwrap_or(down),
                     intensity: light.intensity,
@@ -462,6 +463,21 @@ fn count(edit: &Edit) -> usize {
     match edit {
         Edit::Several(edits) => edits.iter().map(count).sum::<usize>().max(1),
         _ => 1,
+    }
+}
+
+/// Whether a light without area may be so; else why not.
+fn check_lamp(kind: NewLightKind, intensity: &Bands) -> Result<(), &'static str> {
+    if intensity.iter().any(|x| !(0.0..=MOST_INTENSITY).contains(x)) {
+        return Err("its intensity is negative, above 1e12 or no number");
+    }
+    match kind {
+        NewLightKind::Spot { inner, outer }
+            if !(inner >= 0.0 && inner <= outer && outer <= MOST_CONE) =>
+        {
+            Err("the half angles of a spot are 0 or more, the outer one no less than the inner and at most π/2")
+        }
+        _ => Ok(()),
     }
 }
 

@@ -49,12 +49,8 @@ impl Light {
 
     /// A light without area.
     pub fn without_area(point: PointLight) -> Light {
-        let kind = match point.kind {
-            PointLightKind::Point => LightKind::Point,
-            PointLightKind::Spot { .. } => LightKind::Spot,
-            PointLightKind::Directional => LightKind::Directional,
-        };
-        Light { point: Some(point.clone()), ..Light::new(kind, &point.name) }
+        let light = Light::new(kind_of(&point), &point.name);
+        Light { point: Some(point), ..light }
     }
 
     /// By what its light is multiplied.
@@ -70,6 +66,15 @@ impl Light {
         let turned = matrix.transform_vector3(light.direction);
         light.direction = turned.try_normalize().unwrap_or(light.direction);
         Some(light)
+    }
+}
+
+/// What a light without area is to people.
+pub fn kind_of(point: &PointLight) -> LightKind {
+    match point.kind {
+        PointLightKind::Point => LightKind::Point,
+        PointLightKind::Spot { .. } => LightKind::Spot,
+        PointLightKind::Directional => LightKind::Directional,
     }
 }
 

@@ -43,7 +43,7 @@ mod solve;
 mod state;
 
 pub use edit::{
-    Applied, Edit, EditError, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
+    Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
 };
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 

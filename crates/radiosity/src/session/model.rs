@@ -99,6 +99,10 @@ pub struct ModelLight {
     pub dimming: f32,
     /// By what its light is multiplied in each band.
     pub colour: Bands,
+    /// Of lights without area, before they are dimmed and coloured: candela per band, or lux per band of parallel light.
+    pub intensity: Option<Bands>,
+    /// Of spots: the half angles inside which they are as bright as they get, and outside which there is no light, radians.
+    pub cone: Option<[f64; 2]>,
     /// Where it is: the middle of an object; nothing for the sky and parallel light.
     pub position: Option<[f64; 3]>,
     /// Where it shines to: spots and parallel light.

@@ -3,7 +3,7 @@
 use super::model::{LightKind, Probe};
 use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session};
 use glam::DVec2;
-use radiosity_scene::{Bands, Projection, Side, luminance};
+use radiosity_scene::{Bands, PointLightKind, Projection, Side, luminance};
 use radiosity_transport::live::{Chunk, Lanes};
 use std::sync::Arc;
 
@@ -126,6 +126,11 @@ impl Session {
                 kind: light.kind,
                 dimming: light.dimming,
                 colour: light.colour,
+                intensity: light.point.as_ref().map(|point| point.intensity),
+                cone: light.point.as_ref().and_then(|point| match point.kind {
+                    PointLightKind::Spot { inner, outer } => Some([inner, outer]),
+                    _ => None,
+                }),
                 position: position.map(|p| p.to_array()),
                 direction: direction.map(|point| point.direction.to_array()),
                 matrix: light.body.map_or(light.matrix, |body| self.objects[body].matrix),
