@@ -4,7 +4,7 @@ import { Ahead } from './ahead';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
 import { lay, read, type Grid } from './grid';
-import { beside, lampAhead, type LampKind } from './lamps';
+import { beside, lampAhead, type Lamp, type LampKind } from './lamps';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
 import { corners, Stage, type Hit } from './stage';
@@ -370,6 +370,14 @@ export class App {
     const position = from.position && new Vector3().fromArray(from.position).applyMatrix4(inScene).toArray();
     this.lightsAhead.change(id, { matrix, position });
     this.edit({ move_light: { light: id, matrix } }, gesture);
+  }
+
+  /** Makes a lamp without area one of another kind, cone or intensity. */
+  changeLamp({ id }: LightNotice, change: Partial<Lamp>): void {
+    this.lightsAhead.change(id, change);
+    const { type, cone, intensity } = this.lights.get(id)!;
+    const kind = cone ? { spot: { inner: cone[0], outer: cone[1] } } : (type as 'point' | 'directional');
+    this.edit({ change_light: { light: id, kind, intensity: intensity! } });
   }
 
   paint(object: number, reflectance: number[], gesture?: number): void {

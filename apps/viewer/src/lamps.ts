@@ -1,7 +1,8 @@
 // Lamps without area that a person adds: how bright they are, and where one looks for them.
 import { DoubleSide, Ray, Vector3 } from 'three';
+import { luminance } from './luminance';
 import type { Stage } from './stage';
-import type { NewLight } from './wire';
+import type { LightNotice, NewLight } from './wire';
 
 /** Kinds of lamps that can be added, and what people call them. */
 export const LAMPS = [['point', 'Point'], ['spot', 'Spot'], ['directional', 'Parallel']] as const;
@@ -22,9 +23,31 @@ const AHEAD = 2;
 /** Metres below the ceiling: light that falls on it at an angle would need a finer mesh than is there. */
 const BELOW = 0.1;
 
-/** Solid angle that a spot fills as if it were as bright everywhere as in its middle: it fades by the square of what is left
- *  of the cosine between both angles, as glTF has it. */
-const SPOT = 2 * Math.PI * (1 - Math.cos(INNER) + (Math.cos(INNER) - Math.cos(OUTER)) / 3);
+/** Solid angle that a lamp fills as if it were as bright everywhere as in its middle. A spot fades by the square of what is
+ *  left of the cosine between both angles, as glTF has it. */
+export function solidAngle(cone: number[] | null): number {
+  if (!cone) return 4 * Math.PI;
+  const [inner, outer] = cone.map(Math.cos);
+  return 2 * Math.PI * (1 - inner + (inner - outer) / 3);
+}
+
+/** What makes a lamp what it is, but for its place. */
+export type Lamp = Pick<LightNotice, 'type' | 'cone' | 'intensity'>;
+
+/** A lamp made one of another kind. It keeps its lumens; what was or becomes parallel light is as bright as one that is added. */
+export function remade({ type, cone, intensity }: Lamp, kind: LampKind): Lamp {
+  if (kind === type) return { type, cone, intensity };
+  const other = kind === 'spot' ? [INNER, OUTER] : null;
+  const now = luminance(intensity!);
+  const flux = type === 'directional' || now === 0 ? FLUX : now * solidAngle(cone);
+  return { type: kind, cone: other, intensity: brighter(intensity!, kind === 'directional' ? SUN : flux / solidAngle(other)) };
+}
+
+/** A colour of light, as bright as asked. */
+export function brighter(intensity: number[], wanted: number): number[] {
+  const now = luminance(intensity);
+  return intensity.map((band) => (now > 0 ? (band * wanted) / now : wanted));
+}
 
 /** A lamp of a kind where who looks sees it. `metre` is as long as a metre is to people who fit into the scene. */
 export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: string): NewLight {
@@ -35,12 +58,13 @@ export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: str
   if (kind === 'directional') {
     // Over the left shoulder, 45° high: what one sees is lit, and its shadows are seen.
     const direction = level(0.5, 0, -1).add(new Vector3(0, -1, 0));
-    return { name, kind, direction: stage.toScene(direction).toArray(), intensity: white(SUN) };
+    // It has a place only when it becomes another kind of lamp.
+    return { name, kind, position: at(place), direction: stage.toScene(direction).toArray(), intensity: white(SUN) };
   }
-  if (kind === 'point') return { name, kind, position: at(place), intensity: white(FLUX / (4 * Math.PI)) };
+  if (kind === 'point') return { name, kind, position: at(place), intensity: white(FLUX / solidAngle(null)) };
   const ceiling = stage.cast(place, new Vector3(0, 1, 0), Infinity, DoubleSide);
   place.y += ceiling ? Math.max(0.5 * ceiling.distance, ceiling.distance - BELOW * metre) : metre;
-  return { name, kind: { spot: { inner: INNER, outer: OUTER } }, position: at(place), intensity: white(FLUX / SPOT) };
+  return { name, kind: { spot: { inner: INNER, outer: OUTER } }, position: at(place), intensity: white(FLUX / solidAngle([INNER, OUTER])) };
 }
 
 /** A place in the air in the middle of the picture, no farther than half way to what is seen there. */

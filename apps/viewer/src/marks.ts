@@ -112,8 +112,12 @@ export class Marks {
 
   /** A light without area. */
   light(light: LightNotice): void {
-    if (!light.position || light.object !== null || light.type === 'sky') return;
     let sprite = this.lamps.get(light.id);
+    if (!light.position || light.object !== null) {
+      // It may have been one with a place before.
+      if (sprite) sprite.visible = false;
+      return;
+    }
     if (!sprite) {
       this.lampPicture ??= lampPicture();
       sprite = new Sprite(new SpriteMaterial({ map: this.lampPicture, depthTest: true, sizeAttenuation: false, toneMapped: false }));
@@ -130,6 +134,7 @@ export class Marks {
   /** The light without area at a place of the canvas, CSS pixels. */
   lampAt(x: number, y: number): number | null {
     for (const [id, sprite] of this.lamps) {
+      if (!sprite.visible) continue;
       const at = this.stage.project(sprite.getWorldPosition(new Vector3()));
       if (at && Math.hypot(at.x - x, at.y - y) < 16) return id;
     }

@@ -58,6 +58,10 @@ export interface LightNotice {
   type: 'object' | 'point' | 'spot' | 'directional' | 'sky';
   dimming: number;
   colour: [number, number, number];
+  /** Candela, or lux of parallel light, before it is dimmed and coloured; none with area. */
+  intensity: number[] | null;
+  /** Half angles of a spot, radians: full within the first, nothing beyond the second. */
+  cone: number[] | null;
   /** From its place in the file to where it is now. */
   matrix: number[];
   position: number[] | null;
@@ -129,10 +133,13 @@ export type Notice =
 /** What a layer shows. */
 export type Layer = 'total' | 'direct' | 'indirect' | 'error' | { bounce: number } | { light: number };
 
+/** Kinds of lights without area. */
+export type LampForm = 'point' | 'directional' | { spot: { inner: number; outer: number } };
+
 /** A light without area that is to be added. Without a direction it shines down. */
 export interface NewLight {
   name: string;
-  kind: 'point' | 'directional' | { spot: { inner: number; outer: number } };
+  kind: LampForm;
   position?: number[];
   direction?: number[];
   /** cd, or lx of parallel light. */
@@ -146,6 +153,7 @@ export type Edit =
   | { move: { object: number; matrix: number[] } }
   | { move_light: { light: number; matrix: number[] } }
   | { add_light: { light: NewLight } }
+  | { change_light: { light: number; kind: LampForm; intensity: number[] } }
   | { copy_light: { light: number; matrix: number[] } }
   | { delete_light: { light: number } }
   | { copy: { object: number; matrix: number[] } }

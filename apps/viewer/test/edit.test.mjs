@@ -382,6 +382,93 @@ test('a lamp is added, duplicated, deleted and brought back by keyboard and by m
   await page.context().close();
 });
 
+test('a lamp of the file becomes another kind, brighter and narrower by keyboard, and light follows as a batch solve has it', async () => {
+  await folder(async (path) => {
+    writeFileSync(join(path, 'studio.gltf'), studio());
+    const lit = await view(join(path, 'studio.gltf'), ...SMALL);
+    const page = await pages.open(lit.url);
+    await done(page);
+    const before = await luxOf(page, 150);
+    const { lights, status: { edits } } = await state(page);
+    const named = (name) => lights.find((light) => light.name === name);
+    const light = async (name) => (await state(page)).lights.find((light) => light.name === name);
+    const becomes = (name, is) => page.waitForFunction(([name, is]) => {
+      const light = window.radiosity.state().lights.find((light) => light.name === name);
+      return Object.entries(is).every(([key, value]) => light[key] === value);
+    }, [name, is]);
+    assert.deepEqual([named('bulb').intensity, named('bulb').cone, named('spot').cone.map((angle) => angle.toFixed(3))], [[200, 200, 200], null, ['0.300', '0.500']]);
+    /** Writes into a field of the panel, and says it with Enter. */
+    const write = async (label, text) => {
+      // A field that has just come is shown with the next picture.
+      await page.locator(`#thing input[aria-label^="${label}"]`).waitFor();
+      await page.locator(`#thing input[aria-label^="${label}"]`).focus();
+      await page.keyboard.press('Control+a');
+      await page.keyboard.type(text);
+      await page.keyboard.press('Enter');
+    };
+
+    // Things have no such fields; lamps have those of their kind.
+    const fields = () => page.locator('#thing input:visible, #thing select:visible').evaluateAll((all) => all.map((one) => one.getAttribute('aria-label')));
+    await page.locator('#things').selectOption({ label: 'floor' });
+    assert.ok((await fields()).every((label) => !/Kind|Intensity|flux|cone/.test(label)), `${await fields()}`);
+    await page.locator('#things').selectOption({ label: 'bulb' });
+    assert.ok((await fields()).includes('Intensity, candela') && !(await fields()).some((label) => /cone/.test(label)), `${await fields()}`);
+    assert.equal(await page.locator('#thing input[aria-label^="Luminous flux"]').inputValue(), String(Math.round(4 * Math.PI * 200)));
+
+    // A point becomes a spot of as many lumens by the arrow key, and then one of 500 lm within 20°.
+    await page.locator('#kind').focus();
+    await page.keyboard.press('ArrowDown');
+    await becomes('bulb', { type: 'spot' });
+    const spot = await light('bulb');
+    const solid = ([inner, outer]) => 2 * Math.PI * (1 - Math.cos(inner) + (Math.cos(inner) - Math.cos(outer)) / 3);
+    assert.ok(Math.abs(spot.intensity[0] * solid(spot.cone) - 4 * Math.PI * 200) < 0.01, `${spot.intensity}`);
+    await write('Inner half angle', '10');
+    await write('Outer half angle', '60');
+    await write('Luminous flux', '500');
+    await done(page, edits + 4);
+    const made = await light('bulb');
+    assert.deepEqual(made.cone.map((angle) => Math.round((1e6 * angle * 180) / Math.PI) / 1e6), [10, 60]);
+    assert.ok(Math.abs(made.intensity[1] * solid(made.cone) - 500) < 0.01, `${made.intensity}`);
+    assert.deepEqual([made.position, made.dimming], [named('bulb').position, 1], 'where it was');
+    await page.locator('#thing').scrollIntoViewIfNeeded();
+    await picture(page, 'lamp-changed');
+
+    // The spot of the file becomes parallel light, which has no place, no cone and no lumens.
+    await page.locator('#things').selectOption({ label: 'spot' });
+    await page.locator('#kind').selectOption('directional');
+    await write('Illuminance', '300');
+    await becomes('spot', { type: 'directional', position: null, cone: null });
+    assert.ok(!(await fields()).some((label) => /flux|cone/.test(label)), `${await fields()}`);
+    await done(page, edits + 6);
+    assert.deepEqual((await light('spot')).intensity, [300, 300, 300]);
+    const off = await compared(page);
+    const now = await luxOf(page, before.points);
+    console.log(`lamps of other kinds: ${(100 * off).toFixed(1)} % from a batch solve, ${(100 * difference(now.lux, before.lux)).toFixed(0)} % from before`);
+    assert.ok(off < NEAR && difference(now.lux, before.lux) > 0.3, `${off}`);
+
+    // What no lamp can be is refused, and the field goes back; each change is undone and made again.
+    await page.keyboard.press('Escape');
+    await page.locator('#things').selectOption({ label: 'bulb' });
+    await write('Outer half angle', '5');
+    await page.waitForFunction(() => /half angles of a spot/.test(window.radiosity.state().message));
+    assert.equal(await page.locator('#thing input[aria-label^="Outer half angle"]').inputValue(), '60');
+    await page.keyboard.press('Escape');
+    for (let i = 0; i < 6; i += 1) await page.keyboard.press('Control+z');
+    await becomes('bulb', { type: 'point' });
+    await becomes('spot', { type: 'spot' });
+    await done(page, edits + 12);
+    assert.deepEqual((await light('bulb')).intensity, [200, 200, 200]);
+    assert.deepEqual((await luxOf(page, before.points)).lux, before.lux, 'as before, to the last bit');
+    for (let i = 0; i < 6; i += 1) await page.keyboard.press('Control+y');
+    await becomes('spot', { type: 'directional' });
+    await done(page, edits + 18);
+    assert.deepEqual((await luxOf(page, before.points)).lux, now.lux);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await lit.end();
+  });
+});
+
 test('where too many layers are looked at, the page says that its own rests, until it follows again', async () => {
   const page = await pages.open(program.url);
   await done(page);

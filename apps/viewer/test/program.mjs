@@ -23,12 +23,17 @@ export const SMALL = ['--elements', '6000', '--rays', '64'];
  *  shadows. Measured: 0.025. An edit that is missed makes it 0.2 and more. */
 export const NEAR = 0.05;
 
+/** Programs that run. */
+const running = new Set();
+
+/** Ends what tests that failed have left: nobody would end before it does. */
+export const endAll = () => running.forEach((program) => program.kill('SIGKILL'));
+
 /** Starts `radiosity view`; gives the address, and the way to end it as Ctrl-C does, which gives the exit code. */
 export async function view(...options) {
   const program = spawn(radiosity, ['view', '--json', '--no-open', ...options], { stdio: ['ignore', 'pipe', 'inherit'] });
-  const ended = new Promise((done) => program.on('close', done));
-  // However the tests end.
-  process.on('exit', () => program.kill('SIGKILL'));
+  running.add(program);
+  const ended = new Promise((done) => program.on('close', done)).finally(() => running.delete(program));
   const url = await new Promise((found, failed) => {
     createInterface(program.stdout).on('line', (line) => {
       const event = JSON.parse(line);

@@ -58,7 +58,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     change: () => app.setLight(light(), { colour: filter(colour.value) }, during(true)),
   });
   const find = el('button', {
-    type: 'button', class: 'name', title: `${KINDS[light().type] ?? 'Light'}; select it in the scene`,
+    type: 'button', class: 'name',
     click: () => (light().object !== null ? app.select(light().object) : app.selectLight(id)),
   }, el('b', {}, name));
   const element = el('div', { class: 'light' },
@@ -68,6 +68,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     set(now) {
       if (now.dimming > 0) last = now.dimming;
       on.checked = now.dimming > 0;
+      find.title = `${KINDS[now.type]}; select it in the scene`;
       element.hidden = now.deleted;
       element.classList.toggle('off', now.dimming === 0);
       dimming.set(100 * now.dimming);

@@ -2,6 +2,7 @@
 import { Vector3 } from 'three';
 import type { App } from '../app';
 import { turnOf } from '../gizmo';
+import { brighter, LAMPS, type LampKind, remade, solidAngle } from '../lamps';
 import { luminance } from '../luminance';
 import { button, choice, el, hex, isOpen, linear, section } from './parts';
 
@@ -45,6 +46,37 @@ export function thingPanel(app: App): HTMLElement {
       if (Number.isFinite(angle)) app.nudge(new Vector3(), angle);
     }
   };
+  // What makes a lamp without area what it is.
+  const lamp = () => (app.selectedLight === null ? undefined : app.lights.get(app.selectedLight));
+  const kind = el('select', {
+    id: 'kind', 'aria-label': 'Kind of the lamp', title: 'Of another kind it keeps its lumens; parallel light begins with 10 000 lx',
+    change: () => { if (lamp()) app.changeLamp(lamp()!, remade(lamp()!, kind.value as LampKind)); },
+  }, ...LAMPS.map(([value, text]) => el('option', { value }, text)));
+  /** A number that changes the lamp; what is no number is as before. */
+  const number = (label: string, title: string, act: (value: number) => void) => {
+    const input = el('input', {
+      type: 'number', min: 0, step: 'any', 'aria-label': label, title,
+      change: () => (lamp() && Number.isFinite(input.valueAsNumber) ? act(input.valueAsNumber) : show()),
+    });
+    return input;
+  };
+  const brighten = (intensity: number) => app.changeLamp(lamp()!, { intensity: brighter(lamp()!.intensity!, intensity) });
+  const intensity = number('Intensity', 'In the middle of its light, before it is dimmed', brighten);
+  const flux = number('Luminous flux, lumens', 'All its light, before it is dimmed', (value) => brighten(value / solidAngle(lamp()!.cone)));
+  const unit = el('span', { class: 'unit' });
+  const fluxes = el('span', { class: 'pair' }, flux, el('span', { class: 'unit' }, 'lm'));
+  const cone = [['Inner', 'As bright as it gets within this angle from its axis'], ['Outer', 'No light beyond this angle from its axis']]
+    .map(([name, title], k) => number(`${name} half angle of the cone, degrees`, title, (value) => {
+      const angles = [...lamp()!.cone!];
+      angles[k] = (value * Math.PI) / 180;
+      app.changeLamp(lamp()!, { cone: angles });
+    }));
+  const cones = el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Cone'),
+    el('span', { class: 'pair' }, cone[0], el('span', { class: 'unit' }, '° to'), cone[1], el('span', { class: 'unit' }, '°')));
+  const lighting = el('div', {},
+    el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Kind'), kind),
+    el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Intensity'), el('span', { class: 'pair' }, intensity, unit, fluxes)),
+    cones);
   /** The thing or the lamp that is selected. */
   const chosen = () => (app.selectedLight !== null ? app.lights.get(app.selectedLight) : app.selected !== null ? app.objects.get(app.selected) : undefined);
 
@@ -81,7 +113,7 @@ export function thingPanel(app: App): HTMLElement {
   const fixed = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Large, so it stays put.'), button('Let it move', () => app.loosen()));
   const painting = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Reflectance'), paint, reflectance, el('span', { class: 'unit' }, '%'));
   const copying = el('div', { class: 'row' }, copy, remove);
-  const body = el('div', {}, name, painting, moving, fixed, copying);
+  const body = el('div', {}, name, painting, lighting, moving, fixed, copying);
   const none = el('p', { class: 'quiet' }, 'Click a thing, press Enter for what is under the cross, or P for one after the other.');
 
   const show = () => {
@@ -100,6 +132,19 @@ export function thingPanel(app: App): HTMLElement {
     if (object) {
       if (!isOpen(paint)) paint.value = hex(object.reflectance);
       if (!isOpen(reflectance)) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
+    }
+    lighting.hidden = !light?.intensity;
+    if (light?.intensity) {
+      const put = (input: HTMLInputElement, value: number) => { if (!isOpen(input)) input.value = String(Number(value.toPrecision(4))); };
+      const candela = luminance(light.intensity);
+      kind.value = light.type;
+      put(intensity, candela);
+      put(flux, candela * solidAngle(light.cone));
+      unit.textContent = light.type === 'directional' ? 'lx' : 'cd';
+      intensity.setAttribute('aria-label', light.type === 'directional' ? 'Illuminance, lux' : 'Intensity, candela');
+      fluxes.hidden = light.type === 'directional';
+      cones.hidden = !light.cone;
+      light.cone?.forEach((angle, k) => put(cone[k], (angle * 180) / Math.PI));
     }
     const spot = app.spot();
     moving.hidden = !spot;
