@@ -1,9 +1,10 @@
 // A line around what is selected: its mask is drawn first, and the line is where the mask ends.
 import {
-  BufferAttribute, BufferGeometry, Color, GLSL3, type Camera, Mesh, MeshBasicMaterial, type Scene, ShaderMaterial, Vector2, type WebGLRenderer,
+  BufferAttribute, BufferGeometry, Color, GLSL3, type Camera, Mesh, type Scene, ShaderMaterial, Vector2, type WebGLRenderer,
   WebGLRenderTarget,
 } from 'three';
-import type { Surface } from './surface';
+import { WIDEN } from './border';
+import { shared, type Surface } from './surface';
 
 /** The layer of three.js that selected surfaces are on. */
 const LAYER = 1;
@@ -15,7 +16,21 @@ export class Outline {
   /** Drawn with the rest of the scene. */
   readonly line: Mesh<BufferGeometry, ShaderMaterial>;
   private mask = new WebGLRenderTarget(1, 1);
-  private white = new MeshBasicMaterial({ color: 0xffffff });
+  private white = new ShaderMaterial({
+    glslVersion: GLSL3,
+    uniforms: { pixels: shared.pixels },
+    vertexShader: /* glsl */ `
+      ${WIDEN}
+      in vec3 outward;
+      void main() {
+        mat4 placed = projectionMatrix * modelViewMatrix;
+        gl_Position = widened(placed * vec4(position, 1.0), placed * vec4(outward, 0.0));
+      }`,
+    fragmentShader: /* glsl */ `
+      precision highp float;
+      out vec4 outColour;
+      void main() { outColour = vec4(1.0); }`,
+  });
   private surfaces: Surface[] = [];
 
   constructor(colour: number) {

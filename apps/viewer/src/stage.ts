@@ -243,6 +243,7 @@ export class Stage {
     this.drawn = coarseness;
     this.renderer.setPixelRatio(SHARPNESS[coarseness] * Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
+    this.renderer.getDrawingBufferSize(shared.pixels.value);
     this.camera.aspect = width / height;
     this.widen();
     this.dirty = true;

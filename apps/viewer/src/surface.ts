@@ -1,9 +1,10 @@
 // A surface as the eye sees it, or as a meter does: light at vertices times reflectance at pixels.
 import {
-  BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, Mesh, MeshBasicMaterial, type Texture, Vector3,
+  BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, Mesh, MeshBasicMaterial, type Texture, Vector2, Vector3,
   type IUniform,
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
+import { outwards, WIDEN } from './border';
 import { WEIGHTS } from './luminance';
 import { LEVELS, PALETTE } from './scale';
 import type { MeshFrame } from './wire';
@@ -50,8 +51,10 @@ export const DISPLAY = /* glsl */ `
 
 export const VERTEX = /* glsl */ `
   #include <batching_pars_vertex>
+  ${WIDEN}
   in vec3 light;
   in vec3 paint;
+  in vec3 outward;
   uniform highp sampler2D looks;
   out vec3 vLight;
   out vec3 reflected;
@@ -71,7 +74,8 @@ export const VERTEX = /* glsl */ `
     #endif
     vLight = light * ${UNIT.toFixed(1)};
     vUv = uv;
-    gl_Position = projectionMatrix * modelViewMatrix * batchingMatrix * vec4(position, 1.0);
+    mat4 placed = projectionMatrix * modelViewMatrix * batchingMatrix;
+    gl_Position = widened(placed * vec4(position, 1.0), placed * vec4(outward, 0.0));
   }
 `;
 
@@ -145,6 +149,8 @@ export const shared = {
   levels: { value: new Array<number>(LEVELS).fill(1) },
   levelCount: { value: 0 },
   isolines: { value: false },
+  /** Of the picture that is drawn, each way. */
+  pixels: { value: new Vector2(1, 1) },
 } satisfies Record<string, IUniform>;
 
 /** How a surface looks, apart from its light. */
@@ -174,6 +180,7 @@ export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
     geometry.setAttribute('position', new BufferAttribute(frame.positions, 3));
     geometry.setAttribute('uv', new BufferAttribute(frame.uvs ?? new Float32Array((2 * frame.positions.length) / 3), 2));
     geometry.setAttribute('paint', new BufferAttribute(frame.colours ?? new Float32Array(frame.positions.length).fill(1), 3));
+    geometry.setAttribute('outward', new BufferAttribute(outwards(frame.positions, frame.indices), 3));
     geometry.setIndex(new BufferAttribute(frame.indices, 1));
     const light = new Float16BufferAttribute(new Uint16Array(frame.positions.length), 3);
     geometry.setAttribute('light', light);

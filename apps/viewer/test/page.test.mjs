@@ -1,8 +1,11 @@
 // The page in a browser, against the program.
 import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, done, luxOf, NEAR, picture, restored, state, stuck } from './program.mjs';
+import { caughtUp, compared, done, folder, luxOf, NEAR, picture, restored, state, stuck, view } from './program.mjs';
+import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
 
@@ -192,6 +195,48 @@ test('layers add up, and models are saved', async () => {
   assert.match((await saved).suggestedFilename(), /\.png$/);
   assert.deepEqual(page.faults, []);
   await page.context().close();
+});
+
+test('through the walls of a closed room nothing is seen, whichever way one looks', async () => {
+  await folder(async (path) => {
+    writeFileSync(join(path, 'room.obj'), room());
+    // Outside it is glaring, and no light comes in.
+    const dark = await view(join(path, 'room.obj'), '--sky', 'overcast:1e9', '--elements', '6000', '--rays', '4');
+    const page = await pages.open(dark.url);
+    await done(page);
+    const lit = await page.evaluate((middle) => {
+      const { app } = window.radiosity;
+      app.exposure.set(-16);
+      const { stage } = app;
+      const gl = stage.renderer.getContext();
+      const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+      const pixels = new Uint8Array(4 * width * height);
+      const bright = (colour) => {
+        stage.drawNow();
+        gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+        let count = 0;
+        for (let i = 0; i < pixels.length; i += 4) if (pixels[i] > colour) count += 1;
+        return count;
+      };
+      stage.overlay.visible = stage.tools.visible = false;
+      const counts = [];
+      for (let way = 0; way < 24; way += 1) {
+        stage.camera.position.set(...middle).x += 0.4 * Math.sin(5 * way);
+        stage.camera.rotation.set(0.7 * Math.sin(2 * way), 0.2617 * way, 0.03 * way);
+        counts.push(bright(8));
+      }
+      // Above the room there is nothing but the sky.
+      stage.camera.position.set(middle[0], middle[1] + 20, middle[2]);
+      stage.camera.rotation.set(0, 0, 0);
+      return { counts, outside: bright(200) / (width * height), objects: app.objects.size };
+    }, middle);
+    assert.equal(lit.objects, 6);
+    assert.ok(lit.outside > 0.4, `the sky glares: ${lit.outside} of what is seen outside`);
+    assert.deepEqual(lit.counts.filter((count) => count > 0), [], `pixels through which the sky is seen: ${lit.counts}`);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    await dark.end();
+  });
 });
 
 test('a narrow screen that is touched', async () => {
