@@ -240,11 +240,33 @@ test('through the walls of a closed room nothing is seen, whichever way one look
 });
 
 test('a narrow screen that is touched', async () => {
-  const page = await pages.open(program.url, { width: 400, height: 800, touch: true });
+  const page = await pages.open(program.url, { width: 390, height: 844, touch: true });
   await done(page);
   await page.touchscreen.tap(200, 300);
   await page.waitForFunction(() => window.radiosity.state().selected !== null);
+  // All of the bar is there, and can be hit.
+  for (const name of ['Walk', 'Orbit', 'Undo', 'Redo', 'Save', '?', 'Panel']) {
+    const box = await page.locator('header').getByText(name, { exact: true }).or(page.locator(`header [aria-label="${name}"]`)).boundingBox();
+    assert.ok(box && box.x >= 0 && box.x + box.width <= 390 && Math.min(box.width, box.height) >= 24, `${name}: ${JSON.stringify(box)}`);
+  }
   await picture(page, 'narrow');
+  const { edits } = (await state(page)).status;
+  await page.evaluate(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming: 0.5 }));
+  await done(page, edits + 1);
+  await page.locator('header [aria-label=Undo]').tap();
+  await done(page, edits + 2);
+  assert.equal((await state(page)).lights[0].dimming, 1);
+  await page.locator('header [aria-label=Redo]').tap();
+  await done(page, edits + 3);
+  assert.equal((await state(page)).lights[0].dimming, 0.5);
+  await restored(page);
+  await page.locator('header button[title^=Keys]').tap();
+  assert.equal(await page.locator('#help').isVisible(), true);
+  await picture(page, 'narrow-help');
+  await page.locator('#help button[aria-label=Close]').tap();
+  await page.locator('#save').tap();
+  await picture(page, 'narrow-menu');
+  await page.keyboard.press('Escape');
   await page.locator('#fold').tap();
   await page.waitForTimeout(600);
   await picture(page, 'narrow-panel');
