@@ -8,8 +8,8 @@ use radiosity::session::{
     SessionOptions,
 };
 use radiosity::{
-    Bands, Material, Mesh, PointLight, Scene, Side, Solution, SolveOptions, Surface, Texture, TextureRef, Tracer, cornell_box,
-    luminance,
+    Bands, Material, Mesh, PointLight, Scene, Side, Solution, SolveOptions, Surface, Texture, TextureRef, Tracer,
+    cornell_box, luminance,
 };
 use radiosity_trace::sampling::Random;
 use room::{Furnishing, room};
@@ -217,13 +217,10 @@ fn catalogue_77_a_changed_lamp_is_one_that_was_always_so() {
     }
     assert_eq!(inverse, from.iter().enumerate().map(|(k, from)| change(k, *from)).collect::<Vec<_>>());
     let lights = session.model().lights;
-    assert_eq!(lights.iter().map(|light| light.kind).collect::<Vec<_>>(), [
-        LightKind::Object,
-        LightKind::Spot,
-        LightKind::Directional,
-        LightKind::Point,
-        LightKind::Spot
-    ]);
+    assert_eq!(
+        lights.iter().map(|light| light.kind).collect::<Vec<_>>(),
+        [LightKind::Object, LightKind::Spot, LightKind::Directional, LightKind::Point, LightKind::Spot]
+    );
     assert_eq!((lights[4].cone, lights[4].intensity), (Some([0.0, 0.25]), Some([6.0, 3.0, 4.0])));
     assert_eq!((lights[0].cone, lights[0].intensity), (None, None));
     finish(&mut session);

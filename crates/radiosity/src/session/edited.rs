@@ -472,9 +472,7 @@ fn check_lamp(kind: NewLightKind, intensity: &Bands) -> Result<(), &'static str>
         return Err("its intensity is negative, above 1e12 or no number");
     }
     match kind {
-        NewLightKind::Spot { inner, outer }
-            if !(inner >= 0.0 && inner <= outer && outer <= MOST_CONE) =>
-        {
+        NewLightKind::Spot { inner, outer } if !(inner >= 0.0 && inner <= outer && outer <= MOST_CONE) => {
             Err("the half angles of a spot are 0 or more, the outer one no less than the inner and at most π/2")
         }
         _ => Ok(()),
