@@ -2,6 +2,11 @@
 //!
 //! Elements around a vertex on the same smooth surface of the object share one value, their mean by area: light is
 //! continuous across them and most of the noise of their rays averages out.
+//!
+//! What is left of that noise made walls mottled. So the part of the light that rays found is averaged over neighbouring vertices
+//! besides, as far as these differ by no more than noise explains (a bilateral filter: Tomasi and Manduchi 1998). What lamps
+//! bring directly has edges of shadows and stays as it is. The weights follow from all light together and are the same for every
+//! layer of it, so that layers still add up.
 
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{Bands, Scene, Side, Surface};
@@ -13,6 +18,22 @@ const SAME_PLACE: f64 = 4e-6;
 
 /// Cosine between normals up to which a surface is smooth: 30°, the usual auto-smooth angle of modelling programs.
 const SMOOTH: f32 = 0.866;
+
+/// Rounds of averages over neighbours: noise on walls falls to a half with one and a third with two; three blur contacts more than
+/// they help.
+const ROUNDS: usize = 2;
+
+/// Differences between vertices that count no more, in relative standard errors of an element (1 over the root of its rays, as
+/// measured on walls of a sunlit room). The mean of six elements differs from its neighbour's by half of one; half as much here
+/// leaves noise, twice as much takes shadows away.
+const REACH: f32 = 2.5;
+
+/// The light of an element: what lamps bring directly, and the rest, which rays found.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Light {
+    pub lamps: Bands,
+    pub rest: Bands,
+}
 
 /// The drawn mesh of a shape. In the coordinates of the file's world.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +48,11 @@ pub struct Display {
     /// Elements around each spot: those of spot s are `starts[s]..starts[s + 1]`, with their weights.
     starts: Vec<u32>,
     around: Vec<(u32, f32)>,
+    /// Area of the elements around each spot.
+    areas: Vec<f32>,
+    /// Spots beside each, as `starts`.
+    beside_starts: Vec<u32>,
+    beside: Vec<u32>,
 }
 
 struct Spot {
@@ -70,28 +96,89 @@ impl Display {
             let whole: f32 = spot.around.iter().map(|(_, weight)| weight).sum();
             display.around.extend(spot.around.iter().map(|(element, weight)| (*element, weight / whole)));
             display.starts.push(display.around.len() as u32);
+            display.areas.push(whole);
         }
+        display.find_beside();
         display
     }
 
-    /// Light at the vertices, from that of the elements; what is buried does not count.
-    pub fn light(&self, light: impl Fn(u32) -> Bands, is_buried: impl Fn(u32) -> bool) -> Vec<Bands> {
-        let spots: Vec<Bands> = self
-            .starts
-            .windows(2)
-            .map(|ends| {
-                let (mut sum, mut whole) = ([0f32; 3], 0f32);
-                for (element, weight) in &self.around[ends[0] as usize..ends[1] as usize] {
-                    if !is_buried(*element) {
-                        let own = light(*element);
-                        whole += weight;
-                        (0..3).for_each(|band| sum[band] += weight * own[band]);
-                    }
+    /// Which spots share an edge of an element.
+    fn find_beside(&mut self) {
+        let mut pairs: Vec<[u32; 2]> = Vec::with_capacity(2 * self.indices.len());
+        for corners in self.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|k| self.spot[corners[k] as usize]);
+            pairs.extend([[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]]);
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        let before = |spot: usize| pairs.partition_point(|pair| (pair[0] as usize) < spot) as u32;
+        self.beside_starts = (0..=self.areas.len()).map(before).collect();
+        self.beside = pairs.into_iter().map(|pair| pair[1]).collect();
+    }
+
+    /// The mean of a property of the elements around each spot, and their area; what is buried does not count.
+    fn at_spots<const N: usize>(
+        &self,
+        of: impl Fn(u32) -> [f32; N],
+        is_buried: &impl Fn(u32) -> bool,
+    ) -> Vec<([f32; N], f32)> {
+        let spot = |(ends, area): (&[u32], &f32)| {
+            let (mut sum, mut whole) = ([0f32; N], 0f32);
+            for (element, weight) in &self.around[ends[0] as usize..ends[1] as usize] {
+                if !is_buried(*element) {
+                    let own = of(*element);
+                    whole += weight;
+                    (0..N).for_each(|k| sum[k] += weight * own[k]);
                 }
-                sum.map(|s| if whole > 0.0 { (s / whole).max(0.0) } else { 0.0 })
-            })
-            .collect();
-        self.spot.iter().map(|spot| spots[*spot as usize]).collect()
+            }
+            (sum.map(|s| if whole > 0.0 { s / whole } else { 0.0 }), whole * area)
+        };
+        self.starts.windows(2).zip(&self.areas).map(spot).collect()
+    }
+
+    /// Light at the vertices, from that of the elements; what is buried does not count. What is averaged with what follows from
+    /// `guide`, the luminance of what rays found of all light, and its relative standard error by element.
+    pub fn light(
+        &self,
+        light: impl Fn(u32) -> Light,
+        (guide, noise): (impl Fn(u32) -> f32, f32),
+        is_buried: impl Fn(u32) -> bool,
+    ) -> Vec<Bands> {
+        let parts = |element| {
+            let Light { lamps: [a, b, c], rest: [d, e, f] } = light(element);
+            [a, b, c, d, e, f]
+        };
+        let spots = self.at_spots(parts, &is_buried);
+        let guides = self.at_spots(|element| [guide(element)], &is_buried);
+        // Tukey's biweight of the difference, relative to the mean of both.
+        let weight = |a: usize, b: u32| {
+            let (([a], _), ([b], area)) = (guides[a], guides[b as usize]);
+            let largest = REACH * noise * 0.5 * (a + b);
+            let near = if largest > 0.0 { (1.0 - ((a - b) / largest).powi(2)).max(0.0) } else { 0.0 };
+            area * near * near
+        };
+        let beside = |spot: usize| self.beside_starts[spot] as usize..self.beside_starts[spot + 1] as usize;
+        let weights: Vec<f32> =
+            (0..spots.len()).flat_map(|s| self.beside[beside(s)].iter().map(move |n| weight(s, *n))).collect();
+        let mut rest: Vec<Bands> = spots.iter().map(|([.., a, b, c], _)| [*a, *b, *c]).collect();
+        let rounds = if noise > 0.0 { ROUNDS } else { 0 };
+        for _ in 0..rounds {
+            let averaged = |(s, own): (usize, &Bands)| {
+                let mut whole = spots[s].1;
+                let mut sum = own.map(|x| whole * x);
+                for (n, weight) in self.beside[beside(s)].iter().zip(&weights[beside(s)]) {
+                    whole += weight;
+                    (0..3).for_each(|band| sum[band] += weight * rest[*n as usize][band]);
+                }
+                sum.map(|x| if whole > 0.0 { x / whole } else { 0.0 })
+            };
+            rest = rest.iter().enumerate().map(averaged).collect();
+        }
+        let whole = |spot: &u32| {
+            let (lamps, rest) = (spots[*spot as usize].0, rest[*spot as usize]);
+            std::array::from_fn(|band| (lamps[band] + rest[band]).max(0.0))
+        };
+        self.spot.iter().map(whole).collect()
     }
 }
 
@@ -134,4 +221,72 @@ fn mesh_uv(scene: &Scene, set: usize, at: Surface) -> DVec2 {
     }
     let [a, b, c] = scene.triangles[at.triangle].map(|v| set[v as usize].as_dvec2());
     a + at.uv.x * (b - a) + at.uv.y * (c - a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Elements of a wall, and where each of them is across it, from 0 to 1.
+    fn wall() -> (Display, Vec<f64>) {
+        let scene = crate::cornell_box();
+        let floor = scene.objects.iter().position(|object| object.name == "floor").unwrap();
+        let shape = Shape::new(&scene, floor, 0.01);
+        let across = |element| {
+            let (t, _, corners) = shape.place(element);
+            let [a, b, c] = shape.corners[t];
+            let uv = (corners[0] + corners[1] + corners[2]) / 3.0;
+            (a + uv.x * (b - a) + uv.y * (c - a)).x
+        };
+        let places: Vec<f64> = (0..shape.elements()).map(across).collect();
+        let (low, high) = places.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+        let places = places.into_iter().map(|x| (x - low) / (high - low)).collect();
+        (Display::new(&scene, floor, &shape, 0.3), places)
+    }
+
+    /// Numbers of mean 0 and variance 1, the same each time.
+    fn noise(element: u32) -> f32 {
+        use radiosity_trace::sampling::{hash, unit};
+        // Of four uniform numbers, each of variance 1/12.
+        (0..4).map(|k| unit(hash(4 * element + k)) - 0.5).sum::<f32>() * 3f32.sqrt()
+    }
+
+    fn spread(light: &[Bands], truth: f32) -> f32 {
+        (light.iter().map(|e| (e[1] - truth).powi(2)).sum::<f32>() / light.len() as f32).sqrt() / truth
+    }
+
+    #[test]
+    fn noise_of_rays_falls_and_light_of_lamps_stays() {
+        let (display, places) = wall();
+        assert!(places.len() > 1000);
+        let found = |element: u32| 100.0 * (1.0 + 0.0625 * noise(element));
+        let light = |element| Light { lamps: [0.0; 3], rest: [found(element); 3] };
+        let plain = display.light(light, (found, 0.0), |_| false);
+        let filtered = display.light(light, (found, 0.0625), |_| false);
+        let (before, after) = (spread(&plain, 100.0), spread(&filtered, 100.0));
+        assert!(before > 0.02 && after < 0.5 * before, "{before} {after}");
+        // What lamps bring is the mean of what is around, whatever the noise of the rest.
+        let lamp = |element: u32| Light { lamps: [found(element); 3], rest: [0.0; 3] };
+        assert_eq!(display.light(lamp, (found, 0.0625), |_| false), plain);
+    }
+
+    #[test]
+    fn an_edge_of_light_stays_sharp_and_layers_add_up() {
+        let (display, places) = wall();
+        let total = |element: u32| if places[element as usize] < 0.5 { 100.0 } else { 150.0 };
+        let rest = |share: f32| move |element| Light { lamps: [0.0; 3], rest: [share * total(element); 3] };
+        let plain = display.light(rest(1.0), (total, 0.0), |_| false);
+        let filtered = display.light(rest(1.0), (total, 0.0625), |_| false);
+        let width = 0.02;
+        for ((plain, filtered), p) in plain.iter().zip(&filtered).zip(&display.positions) {
+            // The floor is 0.5528 m wide.
+            if (f64::from(p[0]) / 0.5528 - 0.5).abs() > 2.0 * width {
+                assert!((plain[1] - filtered[1]).abs() < 1e-3, "{p:?}: {plain:?} {filtered:?}");
+            }
+        }
+        let parts = [0.25, 0.75].map(|share| display.light(rest(share), (total, 0.0625), |_| false));
+        for ((a, b), all) in parts[0].iter().zip(&parts[1]).zip(&filtered) {
+            assert!((a[1] + b[1] - all[1]).abs() < 1e-3);
+        }
+    }
 }

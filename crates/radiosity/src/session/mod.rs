@@ -133,7 +133,14 @@ pub struct Session {
 }
 
 /// A layer by id, and of which revision it is.
-type Kept = (Layer, u64, Arc<Vec<Lanes<4>>>);
+#[derive(Clone)]
+struct Kept {
+    layer: Layer,
+    revision: u64,
+    values: Arc<Vec<Lanes<4>>>,
+    /// The part of it that lamps bring directly; empty where there is none.
+    lamps: Arc<Vec<Lanes<4>>>,
+}
 
 /// An object as it is now.
 #[derive(Clone)]

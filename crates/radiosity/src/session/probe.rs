@@ -1,7 +1,7 @@
 //! What is read from a session: the model, layers of light, a place on a surface, its rays.
 
 use super::model::{LightKind, Probe};
-use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session};
+use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session, display};
 use glam::DVec2;
 use radiosity_scene::{Bands, PointLightKind, Projection, Side, luminance};
 use radiosity_transport::live::{Chunk, Lanes};
@@ -142,21 +142,30 @@ impl Session {
     }
 
     /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, or for
-    /// [`Layer::Error`] its standard error. Empty for an object that there is not. Lights beyond the 31st share one column, and
+    /// [`Layer::Error`] its standard error. What rays found of it is averaged over neighbours that differ by no more than noise. Empty for an object that there is not. Lights beyond the 31st share one column, and
     /// [`Layer::Light`] shows what all of them bring.
     pub fn light(&self, object: ObjectId, layer: Layer) -> Vec<Bands> {
         let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
-        let by_id = self.layer(layer);
+        let kept = self.layer(layer);
         let first = body.first as usize;
-        let at = |element: u32| -> Bands {
-            by_id.get(first + element as usize).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]])
+        let of = |list: &[Lanes<4>], element: u32| -> Bands {
+            list.get(first + element as usize).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]])
         };
+        let at = |element| {
+            let (whole, lamps) = (of(&kept.values, element), of(&kept.lamps, element));
+            display::Light { lamps, rest: std::array::from_fn(|band| whole[band] - lamps[band]) }
+        };
+        let guide =
+            |element| (luminance(of(&self.state.shown, element)) - luminance(of(&self.state.direct, element))).max(0.0);
+        let rays = self.state.solved_rays;
+        // What the error is said to be is not made less.
+        let noise = if rays > 0 && layer != Layer::Error { 1.0 / (rays as f32).sqrt() } else { 0.0 };
         let chunks = self.chunks_of(object.0 as usize);
         let is_buried = |element: u32| {
             let place = chunks.partition_point(|chunk| chunk.first <= element).saturating_sub(1);
             chunks.get(place).is_some_and(|chunk| chunk.is_buried((element - chunk.first) as usize))
         };
-        self.display(object.0 as usize).light(at, is_buried)
+        self.display(object.0 as usize).light(at, (guide, noise), is_buried)
     }
 
     /// Irradiance of each element of an object, in the order of [`ModelObject::indices`]: lux per band.
@@ -188,20 +197,40 @@ impl Session {
     }
 
     /// A layer by id. The last ones are kept, as they are asked for object by object.
-    fn layer(&self, layer: Layer) -> Arc<Vec<Lanes<4>>> {
+    fn layer(&self, layer: Layer) -> Kept {
         let mut cache = self.cache.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let revision = self.state.revision;
-        cache.retain(|(_, of, _)| *of == revision);
-        let kept = match cache.iter().position(|(kept, ..)| *kept == layer) {
+        cache.retain(|kept| kept.revision == revision);
+        let kept = match cache.iter().position(|kept| kept.layer == layer) {
             Some(place) => cache.remove(place),
-            None => (layer, revision, Arc::new(self.find_layer(layer, &cache))),
+            None => Kept {
+                layer,
+                revision,
+                values: Arc::new(self.find_layer(layer, &cache)),
+                lamps: Arc::new(self.lamps_of(layer)),
+            },
         };
         if cache.len() == MOST_KEPT {
             cache.remove(0);
         }
-        let values = kept.2.clone();
-        cache.push(kept);
-        values
+        cache.push(kept.clone());
+        kept
+    }
+
+    /// The part of a layer that lamps bring directly, by id.
+    fn lamps_of(&self, layer: Layer) -> Vec<Lanes<4>> {
+        match layer {
+            Layer::Total | Layer::Direct | Layer::Bounce(0) => self.state.direct.clone(),
+            Layer::Light(light) => self.light_of(light).map_or_else(Vec::new, |light| {
+                let strand = &self.strands[light.strand];
+                let mut by_id = vec![Lanes::default(); self.live.ids()];
+                let columns: Vec<(usize, Bands)> =
+                    strand.column.map(|c| (c, self.factor(strand))).into_iter().collect();
+                self.live.add_direct(&columns, &mut by_id);
+                by_id
+            }),
+            Layer::Indirect | Layer::Bounce(_) | Layer::Error => Vec::new(),
+        }
     }
 
     /// Light that comes straight from lights: direct light, and what rows find of emission.
@@ -233,8 +262,10 @@ impl Session {
             Layer::Bounce(count) => {
                 let count = if state.solved_rays > 0 { count.min(MOST_BOUNCES) } else { 0 };
                 // From the last one before it that is known.
-                let before = |(kept, _, values): &Kept| match kept {
-                    Layer::Bounce(of) if *of <= count && values.len() == self.live.ids() => Some((*of, values.clone())),
+                let before = |kept: &Kept| match kept.layer {
+                    Layer::Bounce(of) if of <= count && kept.values.len() == self.live.ids() => {
+                        Some((of, kept.values.clone()))
+                    }
                     _ => None,
                 };
                 let nearest = known.iter().filter_map(before).max_by_key(|(of, _)| *of);
