@@ -116,26 +116,6 @@ impl Display {
         self.beside = pairs.into_iter().map(|pair| pair[1]).collect();
     }
 
-    /// The mean of a property of the elements around each spot, and their area; what is buried does not count.
-    fn at_spots<const N: usize>(
-        &self,
-        of: impl Fn(u32) -> [f32; N],
-        is_buried: &impl Fn(u32) -> bool,
-    ) -> Vec<([f32; N], f32)> {
-        let spot = |(ends, area): (&[u32], &f32)| {
-            let (mut sum, mut whole) = ([0f32; N], 0f32);
-            for (element, weight) in &self.around[ends[0] as usize..ends[1] as usize] {
-                if !is_buried(*element) {
-                    let own = of(*element);
-                    whole += weight;
-                    (0..N).for_each(|k| sum[k] += weight * own[k]);
-                }
-            }
-            (sum.map(|s| if whole > 0.0 { s / whole } else { 0.0 }), whole * area)
-        };
-        self.starts.windows(2).zip(&self.areas).map(spot).collect()
-    }
-
     /// Light at the vertices, from that of the elements; what is buried does not count. What is averaged with what follows from
     /// `guide`, the luminance of what rays found of all light, and its relative standard error by element.
     pub fn light(
@@ -144,41 +124,62 @@ impl Display {
         (guide, noise): (impl Fn(u32) -> f32, f32),
         is_buried: impl Fn(u32) -> bool,
     ) -> Vec<Bands> {
-        let parts = |element| {
+        // Of elements that are not buried: the light of lamps, the rest, and the guide.
+        let element = |element: u32| {
             let Light { lamps: [a, b, c], rest: [d, e, f] } = light(element);
-            [a, b, c, d, e, f]
+            (!is_buried(element)).then(|| [a, b, c, d, e, f, guide(element)])
         };
-        let spots = self.at_spots(parts, &is_buried);
-        let guides = self.at_spots(|element| [guide(element)], &is_buried);
-        // Tukey's biweight of the difference, relative to the mean of both.
-        let weight = |a: usize, b: u32| {
-            let (([a], _), ([b], area)) = (guides[a], guides[b as usize]);
-            let largest = REACH * noise * 0.5 * (a + b);
-            let near = if largest > 0.0 { (1.0 - ((a - b) / largest).powi(2)).max(0.0) } else { 0.0 };
-            area * near * near
-        };
-        let beside = |spot: usize| self.beside_starts[spot] as usize..self.beside_starts[spot + 1] as usize;
-        let weights: Vec<f32> =
-            (0..spots.len()).flat_map(|s| self.beside[beside(s)].iter().map(move |n| weight(s, *n))).collect();
-        let mut rest: Vec<Bands> = spots.iter().map(|([.., a, b, c], _)| [*a, *b, *c]).collect();
-        let rounds = if noise > 0.0 { ROUNDS } else { 0 };
-        for _ in 0..rounds {
-            let averaged = |(s, own): (usize, &Bands)| {
-                let mut whole = spots[s].1;
-                let mut sum = own.map(|x| whole * x);
-                for (n, weight) in self.beside[beside(s)].iter().zip(&weights[beside(s)]) {
+        let elements: Vec<Option<[f32; 7]>> = (0..self.indices.len() as u32 / 3).map(element).collect();
+        // Their means around each spot, and their area there.
+        let spot = |(ends, area): (&[u32], &f32)| {
+            let (mut sum, mut whole) = ([0f32; 7], 0f32);
+            for (element, weight) in &self.around[ends[0] as usize..ends[1] as usize] {
+                if let Some(own) = &elements[*element as usize] {
                     whole += weight;
-                    (0..3).for_each(|band| sum[band] += weight * rest[*n as usize][band]);
+                    (0..7).for_each(|k| sum[k] += weight * own[k]);
                 }
-                sum.map(|x| if whole > 0.0 { x / whole } else { 0.0 })
-            };
-            rest = rest.iter().enumerate().map(averaged).collect();
+            }
+            (sum.map(|s| if whole > 0.0 { s / whole } else { 0.0 }), whole * area)
+        };
+        let spots: Vec<([f32; 7], f32)> = self.starts.windows(2).zip(&self.areas).map(spot).collect();
+        let mut rest: Vec<Bands> = spots.iter().map(|([_, _, _, a, b, c, _], _)| [*a, *b, *c]).collect();
+        if noise > 0.0 {
+            self.average(&mut rest, &spots, noise);
         }
         let whole = |spot: &u32| {
             let (lamps, rest) = (spots[*spot as usize].0, rest[*spot as usize]);
             std::array::from_fn(|band| (lamps[band] + rest[band]).max(0.0))
         };
         self.spot.iter().map(whole).collect()
+    }
+
+    /// Averages over neighbours that differ by no more than noise, by the guide and the area of each spot.
+    fn average(&self, rest: &mut Vec<Bands>, spots: &[([f32; 7], f32)], noise: f32) {
+        // Tukey's biweight of the difference, relative to the mean of both.
+        let weight = |a: usize, b: u32| {
+            let (a, (b, area)) = (spots[a].0[6], &spots[b as usize]);
+            let largest = REACH * noise * 0.5 * (a + b[6]);
+            let near = if largest > 0.0 { (1.0 - ((a - b[6]) / largest).powi(2)).max(0.0) } else { 0.0 };
+            area * near * near
+        };
+        let beside = |spot: usize| self.beside_starts[spot] as usize..self.beside_starts[spot + 1] as usize;
+        let mut weights = Vec::with_capacity(self.beside.len());
+        for spot in 0..spots.len() {
+            weights.extend(self.beside[beside(spot)].iter().map(|n| weight(spot, *n)));
+        }
+        for _ in 0..ROUNDS {
+            let averaged = |(spot, own): (usize, &Bands)| {
+                let mut whole = spots[spot].1;
+                let mut sum = own.map(|x| whole * x);
+                for (n, weight) in self.beside[beside(spot)].iter().zip(&weights[beside(spot)]) {
+                    whole += weight;
+                    let other = rest[*n as usize];
+                    (0..3).for_each(|band| sum[band] += weight * other[band]);
+                }
+                sum.map(|x| if whole > 0.0 { x / whole } else { 0.0 })
+            };
+            *rest = rest.iter().enumerate().map(averaged).collect();
+        }
     }
 }
 
