@@ -287,6 +287,8 @@ export class App {
     const surface = this.stage.surfaces.get(frame.object);
     if (surface) this.stage.shine(surface, frame.first, frame.values);
     this.rest('');
+    // What was read before it came is read again.
+    this.asked = '';
     this.exposure.lit();
   }
 

@@ -158,7 +158,7 @@ impl Session {
         let guide =
             |element| (luminance(of(&self.state.shown, element)) - luminance(of(&self.state.direct, element))).max(0.0);
         let rays = self.state.solved_rays;
-        // What the error is said to be is not made less.
+        // A ray that finds light or none at random is as far off as that; what the error is said to be is not made less.
         let noise = if rays > 0 && layer != Layer::Error { 1.0 / (rays as f32).sqrt() } else { 0.0 };
         let chunks = self.chunks_of(object.0 as usize);
         let is_buried = |element: u32| {
