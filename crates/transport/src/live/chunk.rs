@@ -348,6 +348,12 @@ impl Chunk {
         self.seen
     }
 
+    /// Whether the light of an element is that of the first few shadow rays to a column.
+    #[cfg(test)]
+    pub fn has_rough_light(&self) -> bool {
+        self.shadows.iter().any(|shadows| shadows.is_rough.contains(&true))
+    }
+
     /// Changes have other numbers now.
     pub fn renumber(&mut self, number: impl Fn(usize) -> usize) {
         self.seen = self.seen.map(number);
@@ -574,13 +580,17 @@ impl Chunk {
             Part::Far => NEAR_SHADOWS.min(known)..known,
         };
         let (world, margin) = (work.world, 4.0 * work.world.offset);
-        if !dirt.balls.iter().any(|ball| light.may_meet(self.ball, *ball)) {
+        // What the first part has made rough the rest makes whole, though nothing of its own is dirty: an object that went away and
+        // came back was elsewhere meanwhile, for the first part only.
+        let is_rough = |e: usize| part == Part::Far && self.shadows[column].is_rough[e];
+        if !dirt.balls.iter().any(|ball| light.may_meet(self.ball, *ball)) && !(0..self.len).any(is_rough) {
             return 0;
         }
         let mut rays = 0;
         for e in 0..self.len {
             let (site, seed) = self.site(world, e);
-            if !dirt.balls.iter().any(|ball| light.may_meet((site.centre, site.radius), *ball)) {
+            let is_rough = part == Part::Far && self.shadows[column].is_rough[e];
+            if !dirt.balls.iter().any(|ball| light.may_meet((site.centre, site.radius), *ball)) && !is_rough {
                 continue;
             }
             let sequence = light.sequence(seed);
@@ -605,7 +615,7 @@ impl Chunk {
                 }
             }
             let own = &mut self.shadows[column];
-            if std::mem::replace(&mut own.clear[e], clear) == clear && !(part == Part::Far && own.is_rough[e]) {
+            if std::mem::replace(&mut own.clear[e], clear) == clear && !is_rough {
                 continue;
             }
             own.is_rough[e] = part == Part::Near && known > NEAR_SHADOWS;

@@ -350,6 +350,29 @@ mod tests {
         (rows.concat(), light.concat())
     }
 
+    /// An object goes away and comes back before the rest of the rays has followed: where it was only meanwhile, light is that of
+    /// all shadow rays again, and not of the first few.
+    #[test]
+    fn a_thing_that_comes_back_leaves_no_rough_light() {
+        let target = Target { rays: 128, shadows: 16 };
+        let fresh = || {
+            let mut live = Live::new(furnished(), 0.7, target);
+            live.add_column(1, &[Lamp::Body(2)]);
+            live.set_target(target);
+            live.work(Part::Far, || true);
+            live
+        };
+        let mut live = fresh();
+        for place in [DAffine3::from_translation(DVec3::new(1.0, 0.5, 0.7)), DAffine3::IDENTITY] {
+            live.place(1, place);
+            live.work(Part::Near, || true);
+        }
+        assert!(live.chunks.iter().any(|chunk| chunk.has_rough_light()), "the first part alone has followed");
+        live.work(Part::Far, || true);
+        assert!(!live.chunks.iter().any(|chunk| chunk.has_rough_light()));
+        assert!(all(&live) == all(&fresh()));
+    }
+
     /// An object is dragged about while rows are still being traced: of its ways little is remembered, and in the end all
     /// rays are those of a fresh start.
     #[test]
