@@ -2,6 +2,7 @@
 
 use crate::answer::Station;
 use crate::field::SMOOTHING;
+use crate::lightmap::AUTOMATIC_TEXELS;
 use crate::measure::{ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
@@ -17,8 +18,12 @@ const CELLS: usize = 30_000;
 /// Rays per cell at least. An error of 5 % would allow 64, but they leave walls blotchy: it is relative to the brightest light.
 const FEWEST_RAYS: usize = 256;
 
-/// How often the rays of a gather are doubled before all is made finer.
+/// How often the rays of a gather are doubled at least before all is made finer.
 pub(crate) const GATHERS: usize = 3;
+
+/// Rays of a lightmap's gathers up to which they are doubled further, relative to those of the solution: to make all finer
+/// takes at least as many again.
+const SOLUTIONS: f64 = 2.0;
 
 /// Rays of the first gather.
 pub(crate) fn gather_rays(error: f64) -> usize {
@@ -110,8 +115,10 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         // The field does not know contacts below the size of its elements: gathering at each point does, and costs less
         // than elements that small.
         let mut rays = gather_rays(options.error);
-        for _ in 0..GATHERS {
-            if audit.upper <= options.error || is_over(monitor) {
+        let affordable = SOLUTIONS * (solution.elements.len() * solution.rays()) as f64 / AUTOMATIC_TEXELS;
+        for doublings in 0.. {
+            let is_dear = doublings >= GATHERS && rays as f64 > affordable;
+            if is_dear || audit.upper <= options.error || is_over(monitor) {
                 break;
             }
             let answer = solution.at(&watched, Indirect::Gather { rays }, &shadowing, monitor)?;

@@ -65,7 +65,7 @@ impl Lightmap {
 pub const TEXEL_BYTES: usize = 400;
 
 /// Texels that the program spends where no density is asked for.
-const AUTOMATIC_TEXELS: f64 = 200_000.0;
+pub(crate) const AUTOMATIC_TEXELS: f64 = 200_000.0;
 
 /// Most texels that are spent for an error: more than a page of 2048 × 2048 is no lightmap for a room any more.
 const MOST_TEXELS: f64 = 4_000_000.0;
