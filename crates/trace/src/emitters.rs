@@ -54,8 +54,9 @@ impl Cone {
     }
 }
 
-/// Part of the squared radius of a node by which what is in it is farther away than the nearest place of its box.
-const NEAREST: f64 = 1.0 / 64.0;
+/// Part of the squared radius of a node by which what is in it is farther away than the nearest place of its box. A path tracer of
+/// a furnished office is 3.6 % off with 1/64, 2.7 % with 1/4, 2.9 % with 1 (512 paths).
+const NEAREST: f64 = 0.25;
 
 /// What is below a node.
 #[derive(Clone, Copy, Debug)]
