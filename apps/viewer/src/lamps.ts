@@ -39,7 +39,7 @@ export function remade({ type, cone, intensity }: Lamp, kind: LampKind): Lamp {
   if (kind === type) return { type, cone, intensity };
   const other = kind === 'spot' ? [INNER, OUTER] : null;
   const now = luminance(intensity!);
-  const flux = type === 'directional' || now === 0 ? FLUX : now * solidAngle(cone);
+  const flux = type !== 'directional' && now * solidAngle(cone) > 0 ? now * solidAngle(cone) : FLUX;
   return { type: kind, cone: other, intensity: brighter(intensity!, kind === 'directional' ? SUN : flux / solidAngle(other)) };
 }
 

@@ -18,11 +18,11 @@ const CELLS: usize = 30_000;
 /// Rays per cell at least. An error of 5 % would allow 64, but they leave walls blotchy: it is relative to the brightest light.
 const FEWEST_RAYS: usize = 256;
 
-/// How often the rays of a gather are doubled at least before all is made finer.
+/// Gathers, each with twice the rays of the one before, that are tried whatever they cost before all is made finer.
 pub(crate) const GATHERS: usize = 3;
 
-/// Rays of a lightmap's gathers up to which they are doubled further, relative to those of the solution: to make all finer
-/// takes at least as many again.
+/// Rays of the gathers of a lightmap, of as many texels as it has where no error asks for more, up to which more are tried,
+/// relative to those of the solution: to make all finer takes at least as many again.
 const SOLUTIONS: f64 = 2.0;
 
 /// Rays of the first gather.

@@ -2,9 +2,12 @@
 //!
 //! A node knows a box and a ball around its emitters, a cone around their normals, and their power. From these follows about
 //! what it gives to a place that sees all of it, and a way down: to each child in proportion to that. What
-//! cannot give anything is never asked, all else with a probability above zero. (Conty Estevez and Kulla 2018, "Importance
+//! cannot give anything is never asked, all else with a probability above zero, but for rounding. (Conty Estevez and Kulla 2018, "Importance
 //! Sampling of Many Lights with Adaptive Tree Splitting", sect. 4 and 5; bounds as in Walter et al. 2005, "Lightcuts",
 //! sect. 4.1.)
+//!
+//! Importance is about Φ/(2π) (1/nearest² + 1/r²) cos(θ − θᵤ) cos(θ' − θₒ − θᵤ), with θᵤ the half angle that the ball is seen
+//! within and θₒ the spread of the normals; within the ball no direction is known, and what stands between never.
 
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -40,14 +43,20 @@ impl Cone {
     /// The smallest that contains both, about.
     fn around(self, other: Cone) -> Cone {
         let (wide, narrow) = if self.angle >= other.angle { (self, other) } else { (other, self) };
-        let apart = wide.axis.angle_between(narrow.axis);
+        let along = wide.axis.dot(narrow.axis);
+        let turned = narrow.axis - wide.axis * along;
+        // Normals of one plane differ in their last bits, of which an arc cosine makes an angle.
+        let apart = turned.length().atan2(along);
         if apart + narrow.angle <= wide.angle {
             return wide;
         }
         let angle = 0.5 * (wide.angle + apart + narrow.angle);
-        let turned = narrow.axis - wide.axis * wide.axis.dot(narrow.axis);
-        if angle >= PI || turned.length_squared() < 1e-24 {
+        if angle >= PI {
             return Cone { axis: wide.axis, angle: PI };
+        }
+        if turned.length_squared() < 1e-24 {
+            // One axis, or opposite ones.
+            return Cone { axis: wide.axis, angle: if along > 0.0 { apart + narrow.angle } else { PI } };
         }
         let turn = angle - wide.angle;
         Cone { axis: (wide.axis * turn.cos() + turned.normalize() * turn.sin()).normalize(), angle }
@@ -318,6 +327,29 @@ mod tests {
         for (emitter, times) in times.iter().enumerate() {
             let share = tree.probability(emitter as u32, point, normal);
             assert!((f64::from(*times) / f64::from(count) - share).abs() < 1e-4, "{emitter}: {times} for {share}");
+        }
+    }
+
+    /// Lamps in one plane give nothing to what is behind it, however the plane is turned.
+    #[test]
+    fn lamps_in_a_plane_have_one_direction() {
+        let mut random = Random::new(11);
+        for _ in 0..40 {
+            let mut unit = || DVec3::from_array(std::array::from_fn(|_| random.next_unit() - 0.5)).normalize();
+            let x = unit();
+            let normal = x.cross(unit()).normalize();
+            let y = normal.cross(x);
+            let triangle = |k: usize| {
+                let at = 0.7 * (k % 8) as f64 * x + 0.9 * (k / 8) as f64 * y;
+                let corners = [at, at + 0.3 * x, at + 0.3 * y];
+                (corners, (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize())
+            };
+            let triangles: Vec<([DVec3; 3], DVec3)> = (0..64).map(triangle).collect();
+            let tree = tree(&triangles, 4);
+            assert!(tree.nodes.iter().all(|node| node.spread[0] > 1.0 - 1e-9));
+            let behind = 2.0 * x + 2.0 * y - 40.0 * normal;
+            assert!(tree.importance(0, behind, normal) <= 0.0);
+            assert!(tree.importance(0, behind + 80.0 * normal, -normal) > 0.0);
         }
     }
 

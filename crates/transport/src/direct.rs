@@ -19,7 +19,8 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Of a light of many triangles, so many groups of them have shadow rays of their own.
+/// Of a light of many triangles, so many groups of them have shadow rays of their own: a lamp of a box and the eleven levels
+/// above it among 1,200 of them. With 16, a lamp 5 mm away was not always found.
 const GROUPS: usize = 24;
 
 /// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
@@ -125,6 +126,8 @@ struct Unshadowed {
     visible: Vec<[f64; 3]>,
     /// What became of the shadow rays at all places of the receiver.
     outcomes: u8,
+    /// Most parts at any of them.
+    most_parts: usize,
     /// Rays of a light from which on its visible share is a ratio.
     ratio: u32,
 }
@@ -170,7 +173,7 @@ impl Luminaires {
                     shaded[k] = scratch.outcomes & !CHANCE != LIT;
                     // Where all is lit or all is dark, what is seen from afar has the light of the whole.
                     let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
-                    let near = receivers.near(i).filter(|_| mixed || scratch.parts.len() > shadowing.rays as usize);
+                    let near = receivers.near(i).filter(|_| mixed || scratch.most_parts > shadowing.rays as usize);
                     let open: Vec<f64> = match near {
                         Some(near) => openness(tracer, &at, near, receivers.seed(i)),
                         None => vec![1.0; at.len()],
@@ -257,6 +260,7 @@ impl Luminaires {
         match &self.lights[light] {
             Light::Point(light) => from_point(light, tracer, place, 1, seed).0,
             Light::Area { pieces, fours, tree: Some(tree), .. } => {
+                // Beside a lamp the way down from the root goes astray: points in four rooms were 47 % off by it, 5 % so.
                 let (mut factors, mut cut) = (Vec::with_capacity(4 * GROUPS), Vec::with_capacity(GROUPS));
                 let mut groups = Vec::with_capacity(GROUPS);
                 let mut total = 0.0;
@@ -298,6 +302,7 @@ impl Luminaires {
             used: vec![0; lights],
             visible: vec![[0.0; 3]; lights],
             outcomes: 0,
+            most_parts: 0,
             ratio,
         }
     }
@@ -317,12 +322,14 @@ impl Luminaires {
         let places = Sequence::new(if set == 0 { seed } else { hash(seed) }, DIRECT);
         scratch.used.fill(0);
         scratch.outcomes = 0;
+        scratch.most_parts = 0;
         let Some(site) = receivers.site(i) else { return };
         let rays = receivers.rays(i, shadowing.rays);
         for index in 0..receivers.places(i, shadowing.places) {
             let [offset, _, x, y] = places.point(index);
             let place = site.place(x, y);
             let total = self.unshadowed(&place, scratch);
+            scratch.most_parts = scratch.most_parts.max(scratch.parts.len());
             let (seed, offset) = match set {
                 0 => (seed, offset),
                 _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ index) ^ hash(set)))),
@@ -499,13 +506,18 @@ mod tests {
         scene
     }
 
-    fn illuminance(scene: &Scene, places: &[Place], rays: u32) -> Vec<f64> {
+    fn prepared(scene: &Scene) -> (Mesh, Luminaires) {
         let mesh = Mesh::new(scene);
-        let tracer = Tracer::new(scene, &mesh);
         let elements = Elements::new(scene, &mesh, 10.0);
         let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
         let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(scene, &mesh, e).1).collect();
         let luminaires = Luminaires::new(scene, &mesh, &elements, &area, &exitance);
+        (mesh, luminaires)
+    }
+
+    fn illuminance(scene: &Scene, places: &[Place], rays: u32) -> Vec<f64> {
+        let (mesh, luminaires) = prepared(scene);
+        let tracer = Tracer::new(scene, &mesh);
         let receivers = PointReceivers { places, shaded: &[] };
         let columns = luminaires.columns(&tracer, &receivers, &Shadowing { places: 1, rays }, &()).unwrap();
         (0..places.len()).map(|i| f64::from(columns.mean(i)[1])).collect()
@@ -561,8 +573,8 @@ mod tests {
         }
     }
 
-    /// Of four hundred lamps the near ones are found and the far ones not forgotten: few rays scatter about the truth, below
-    /// a lamp by little.
+    /// Of four hundred lamps the near ones are found and the far ones not forgotten: few rays scatter about the truth, and by
+    /// little; so does the single one of a gather.
     #[test]
     fn many_lamps_are_unbiased() {
         let mut scene = Scene::default();
@@ -574,6 +586,8 @@ mod tests {
         for (i, j) in (0..20).flat_map(|i| (0..20).map(move |j| (i, j))) {
             scene.add_quad("lamp", 1, quad(low(i, j), DVec3::Y * 0.2, DVec3::X * 0.2));
         }
+        let (mesh, luminaires) = prepared(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
         for [x, y] in [[21.0, 21.0], [20.0, 7.0], [0.1, 39.0]] {
             let at = on_the_floor(x, y);
             let of_lamp = |i: u32, j: u32| {
@@ -587,8 +601,13 @@ mod tests {
             let mean = e.iter().sum::<f64>() / e.len() as f64;
             let spread = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / e.len() as f64).sqrt();
             let error = spread / (e.len() as f64).sqrt();
+            // Five standard errors: a false alarm once in two million.
             assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
             assert!(spread < 0.15 * truth, "({x}, {y}): {spread} about {truth}");
+            let single: Vec<f64> = (0..4000).map(|seed| luminaires.sample(0, &tracer, &at, hash(seed))[1]).collect();
+            let mean = single.iter().sum::<f64>() / 4000.0;
+            let error = (single.iter().map(|e| (e - mean).powi(2)).sum::<f64>()).sqrt() / 4000.0;
+            assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
         }
     }
 }

@@ -225,5 +225,5 @@ fn light_density(emitter: &Source, probability: f64, distance: f64, direction: D
 
 /// Weight of a sample taken with density `own` where the other way would have had density `other`.
 fn balance(own: f64, other: f64) -> f64 {
-    own / (own + other)
+    if other > 0.0 { own / (own + other) } else { 1.0 }
 }

@@ -142,7 +142,8 @@ export function thingPanel(app: App): HTMLElement {
       put(flux, candela * solidAngle(light.cone));
       unit.textContent = light.type === 'directional' ? 'lx' : 'cd';
       intensity.setAttribute('aria-label', light.type === 'directional' ? 'Illuminance, lux' : 'Intensity, candela');
-      fluxes.hidden = light.type === 'directional';
+      // A spot that has no width has no lumens, either.
+      fluxes.hidden = light.type === 'directional' || solidAngle(light.cone) === 0;
       cones.hidden = !light.cone;
       light.cone?.forEach((angle, k) => put(cone[k], (angle * 180) / Math.PI));
     }

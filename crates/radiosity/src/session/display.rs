@@ -27,6 +27,9 @@ const ROUNDS: usize = 2;
 /// from its neighbour's by half of one; half as much here leaves noise, twice as much takes shadows away.
 const REACH: f32 = 2.5;
 
+/// Fewest neighbours of a vertex that are around it: at the border of a surface their mean is one-sided.
+const AROUND: usize = 5;
+
 /// The standard error of an element over the median difference of a vertex from the mean of its neighbours: with six elements around
 /// each, of which neighbours share two, that difference has 0.32 standard errors of an element as its own, and 0.67 of those as
 /// its median.
@@ -124,7 +127,7 @@ impl Display {
     }
 
     /// Light at the vertices, from that of the elements; what is buried does not count. What is averaged with what follows from
-    /// `guide`, the luminance of what rays found of all light, and the most that its relative standard error by element can be.
+    /// `guide`, the luminance of what rays found of all light, and what is taken for its relative standard error by element.
     pub fn light(
         &self,
         light: impl Fn(u32) -> Light,
@@ -168,7 +171,7 @@ impl Display {
         for spot in 0..spots.len() as u32 {
             let ends = [spot, spot + 1].map(|spot| self.beside_starts[spot as usize] as usize);
             let beside = &self.beside[ends[0]..ends[1]];
-            if beside.len() < 5 || guide(spot) <= 0.0 {
+            if beside.len() < AROUND || guide(spot) <= 0.0 {
                 continue;
             }
             let mean = beside.iter().map(|n| guide(*n)).sum::<f32>() / beside.len() as f32;

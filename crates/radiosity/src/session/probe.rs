@@ -142,8 +142,9 @@ impl Session {
     }
 
     /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, or for
-    /// [`Layer::Error`] its standard error. What rays found of it is averaged over neighbours that differ by no more than noise. Empty for an object that there is not. Lights beyond the 31st share one column, and
-    /// [`Layer::Light`] shows what all of them bring.
+    /// [`Layer::Error`] its standard error. What rays found of it is averaged over neighbours that differ by no more than noise.
+    /// Empty for an object that there is not. Lights beyond the 31st share one column, and [`Layer::Light`] shows what all of
+    /// them bring.
     pub fn light(&self, object: ObjectId, layer: Layer) -> Vec<Bands> {
         let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
         let kept = self.layer(layer);
@@ -158,7 +159,7 @@ impl Session {
         let guide =
             |element| (luminance(of(&self.state.shown, element)) - luminance(of(&self.state.direct, element))).max(0.0);
         let rays = self.state.solved_rays;
-        // A ray that finds light or none at random is as far off as that; what the error is said to be is not made less.
+        // As of rays of which one in two finds light; rarer light is noisier and stays so. An error is not made less.
         let noise = if rays > 0 && layer != Layer::Error { 1.0 / (rays as f32).sqrt() } else { 0.0 };
         let chunks = self.chunks_of(object.0 as usize);
         let is_buried = |element: u32| {
