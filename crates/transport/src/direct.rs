@@ -8,20 +8,14 @@
 //! light get its exact factor, and points near a large one, where area sampling goes wrong by factors, are as good
 //! as far ones.
 
-use crate::luminaires::{Light, MOST_EXACT_PIECES, Piece};
-use crate::one_light::{CHANCE, DARK, LIT, from_few, from_many, from_point, luminance_of, unshadowed};
-use crate::polygon::Four;
+use crate::one_light::{CHANCE, DARK, LIT, luminance_of};
+use crate::parts::Parts;
 use crate::{Luminaires, Progress, Receivers, Stopped};
-use radiosity_scene::{Bands, luminance};
+use radiosity_scene::Bands;
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
-use radiosity_trace::{EmitterTree, Place, Tracer};
+use radiosity_trace::{Place, Tracer};
 use rayon::prelude::*;
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// Of a light of many triangles, so many groups of them have shadow rays of their own: a lamp of a box and the eleven levels
-/// above it among 1,200 of them. With 16, a lamp 5 mm away was not always found.
-const GROUPS: usize = 24;
 
 /// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
 /// much w varies. Fewer rays are averaged plainly, without any bias; pilots can do with the bias.
@@ -96,30 +90,9 @@ pub struct Variation {
     pub variance: f32,
 }
 
-/// What has shadow rays of its own at a place: a light, or of one with many triangles some of them.
-struct Part {
-    light: usize,
-    /// What it gives unshadowed, luminance-weighted, or about that.
-    weight: f64,
-    what: What,
-}
-
-enum What {
-    Point,
-    /// Triangles whose parts are known: which they are of the light's, where their factors begin, and what they give
-    /// together, lux per band.
-    Few(Range<usize>, usize, [f64; 3]),
-    /// What is below a node of a light's tree.
-    Many(u32),
-}
-
-/// What the lights give unshadowed at one place, and the room to work it out.
-struct Unshadowed {
-    parts: Vec<Part>,
-    /// By triangle of those whose parts are known, luminance-weighted.
-    factors: Vec<f64>,
-    /// Nodes of a tree, with their importance.
-    cut: Vec<(u32, f64)>,
+/// What is found at one place after the other of a receiver, and the room to work it out.
+struct Scratch<'l> {
+    parts: Parts<'l>,
     /// Shadow rays that each light has had at all places of the receiver.
     used: Vec<u32>,
     /// Result by light, lux per band.
@@ -254,51 +227,29 @@ impl Luminaires {
         Ok(variation)
     }
 
-    /// One unbiased sample of the irradiance of a place from one light.
-    pub(crate) fn sample(&self, light: usize, tracer: &Tracer, place: &Place, seed: u32) -> [f64; 3] {
+    /// One unbiased sample of the irradiance of a place from one light; `parts` is room to work it out.
+    pub(crate) fn sample<'l>(
+        &'l self,
+        light: usize,
+        tracer: &Tracer,
+        place: &Place,
+        seed: u32,
+        parts: &mut Parts<'l>,
+    ) -> [f64; 3] {
+        parts.clear();
+        parts.add(light, &self.lights[light], place);
+        // The stream of places has no other use here.
+        let pick = || Sequence::new(seed, DIRECT).point(0)[0];
+        let Some((part, probability)) = parts.pick(pick) else { return [0.0; 3] };
         let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
-        match &self.lights[light] {
-            Light::Point(light) => from_point(light, tracer, place, 1, seed).0,
-            Light::Area { pieces, fours, tree: Some(tree), .. } => {
-                // Beside a lamp the way down from the root goes astray: points in four rooms were 47 % off by it, 5 % so.
-                let (mut factors, mut cut) = (Vec::with_capacity(4 * GROUPS), Vec::with_capacity(GROUPS));
-                let mut groups = Vec::with_capacity(GROUPS);
-                let mut total = 0.0;
-                by_groups((pieces, fours, tree), place, &mut factors, &mut cut, |weight, what| {
-                    total += weight;
-                    groups.push((weight, what));
-                });
-                // The stream of places has no other use here.
-                let mut rest = f64::from(Sequence::new(seed, DIRECT).point(0)[0]) * total;
-                let picked = groups.iter().find(|(weight, _)| {
-                    rest -= weight;
-                    rest < 0.0
-                });
-                let Some((weight, what)) = picked.or(groups.last()) else { return [0.0; 3] };
-                let (e, _) = match what {
-                    What::Few(range, first, here) => {
-                        let own = (&pieces[range.clone()], &factors[*first..][..range.len()]);
-                        from_few(own, *here, tracer, place, (&sequence, 0, 1), (RATIO, seed))
-                    }
-                    What::Many(node) => from_many((pieces, fours, tree, *node), tracer, place, (&sequence, 0, 1), seed),
-                    What::Point => return [0.0; 3],
-                };
-                e.map(|e| e * total / weight)
-            }
-            Light::Area { pieces, fours, tree: None, .. } => {
-                let mut factors = [0.0; MOST_EXACT_PIECES];
-                let here = unshadowed((pieces, fours), place, &mut factors);
-                from_few((pieces, &factors), here, tracer, place, (&sequence, 0, 1), (RATIO, seed)).0
-            }
-        }
+        let (e, _) = parts.irradiance(part, tracer, place, (&sequence, 0, 1), (RATIO, seed));
+        e.map(|e| e / probability)
     }
 
-    fn scratch(&self, ratio: u32) -> Unshadowed {
+    fn scratch(&self, ratio: u32) -> Scratch<'_> {
         let lights = self.lights.len();
-        Unshadowed {
-            parts: Vec::new(),
-            factors: Vec::new(),
-            cut: Vec::new(),
+        Scratch {
+            parts: Parts::default(),
             used: vec![0; lights],
             visible: vec![[0.0; 3]; lights],
             outcomes: 0,
@@ -309,13 +260,13 @@ impl Luminaires {
 
     /// Calls back with the number and the place for each place of a receiver that is not buried, and with what each light
     /// gives there. The sets 1 and 2 are independent shadow rays at the same places, other ones than those of set 0.
-    fn at_places(
-        &self,
+    fn at_places<'l>(
+        &'l self,
         tracer: &Tracer,
         receivers: &impl Receivers,
         (i, set): (usize, u32),
         shadowing: &Shadowing,
-        scratch: &mut Unshadowed,
+        scratch: &mut Scratch<'l>,
         mut visit: impl FnMut(u32, &Place, &[[f64; 3]]),
     ) {
         let seed = receivers.seed(i);
@@ -328,13 +279,16 @@ impl Luminaires {
         for index in 0..receivers.places(i, shadowing.places) {
             let [offset, _, x, y] = places.point(index);
             let place = site.place(x, y);
-            let total = self.unshadowed(&place, scratch);
+            scratch.parts.clear();
+            for (l, light) in self.lights.iter().enumerate() {
+                scratch.parts.add(l, light, &place);
+            }
             scratch.most_parts = scratch.most_parts.max(scratch.parts.len());
             let (seed, offset) = match set {
                 0 => (seed, offset),
                 _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ index) ^ hash(set)))),
             };
-            let outcome = self.shadow(tracer, &place, (rays, total), (f64::from(offset), seed, index), scratch);
+            let outcome = scratch.shadow(tracer, &place, rays, (f64::from(offset), seed, index));
             scratch.outcomes |= outcome;
             // A place inside a solid is not a part of what is seen; one that is not has rays that get away.
             if outcome & DARK == 0 || !receivers.buried(tracer, &place, hash(seed ^ index)) {
@@ -342,60 +296,21 @@ impl Luminaires {
             }
         }
     }
+}
 
-    /// What each light would give at a place, by parts; answers the sum of their weights.
-    fn unshadowed(&self, place: &Place, scratch: &mut Unshadowed) -> f64 {
-        let Unshadowed { parts, factors, cut, .. } = scratch;
-        parts.clear();
-        factors.clear();
-        let mut total = 0.0;
-        let mut add = |light: usize, weight: f64, what: What| {
-            if weight > 0.0 {
-                total += weight;
-                parts.push(Part { light, weight, what });
-            }
-        };
-        for (l, light) in self.lights.iter().enumerate() {
-            match light {
-                Light::Point(light) => {
-                    let (direction, _, arriving) = light.arrival(place.point);
-                    let cosine = direction.dot(place.normal).max(0.0);
-                    add(l, cosine * f64::from(luminance(arriving)), What::Point);
-                }
-                Light::Area { pieces, fours, tree: None, .. } => {
-                    let (weight, what) = of_few((pieces, fours), 0, place, factors);
-                    add(l, weight, what);
-                }
-                Light::Area { pieces, fours, tree: Some(tree), .. } => {
-                    by_groups((pieces, fours, tree), place, factors, cut, |weight, what| add(l, weight, what));
-                }
-            }
-        }
-        total
-    }
-
-    /// What each light gives at a place, into `scratch.visible`; what became of the shadow rays.
-    fn shadow(
-        &self,
-        tracer: &Tracer,
-        place: &Place,
-        (rays, total): (u32, f64),
-        (offset, seed, index): (f64, u32, u32),
-        scratch: &mut Unshadowed,
-    ) -> u8 {
-        scratch.visible.fill([0.0; 3]);
-        if total <= 0.0 {
-            return 0;
-        }
+impl Scratch<'_> {
+    /// What each light gives at a place, into `visible`; what became of the shadow rays.
+    fn shadow(&mut self, tracer: &Tracer, place: &Place, rays: u32, (offset, seed, index): (f64, u32, u32)) -> u8 {
+        self.visible.fill([0.0; 3]);
 
         // Deal the rays out: part l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average. Half of them go by what the parts
         // would give and half to all alike, as a lamp that had a ray now and then would sparkle in sunlight.
-        let Unshadowed { parts, factors, used, visible, ratio, .. } = scratch;
+        let Scratch { parts, used, visible, ratio, .. } = self;
         let even = 0.5 * f64::from(rays) / parts.len() as f64;
         let (mut reached, mut outcomes) = (offset, 0);
         for (number, part) in parts.iter().enumerate() {
             let l = part.light;
-            let expected = 0.5 * f64::from(rays) * part.weight / total + even;
+            let expected = 0.5 * f64::from(rays) * part.weight / parts.total() + even;
             let before = reached.floor();
             reached += expected;
             let n = (reached.floor() - before) as u32;
@@ -406,17 +321,7 @@ impl Luminaires {
             let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), used[l], n);
             used[l] += n;
             let salt = hash(seed ^ hash(index ^ hash(number as u32)));
-            let (mut e, outcome) = match (&self.lights[l], &part.what) {
-                (Light::Area { pieces, .. }, What::Few(range, first, here)) => {
-                    let factors = &factors[*first..][..range.len()];
-                    from_few((&pieces[range.clone()], factors), *here, tracer, place, samples, (*ratio, salt))
-                }
-                (Light::Area { pieces, fours, tree: Some(tree), .. }, What::Many(node)) => {
-                    from_many((pieces, fours, tree, *node), tracer, place, samples, salt)
-                }
-                (Light::Point(light), _) => from_point(light, tracer, place, n, salt),
-                (Light::Area { .. }, _) => continue,
-            };
+            let (mut e, outcome) = parts.irradiance(part, tracer, place, samples, (*ratio, salt));
             if expected < 1.0 {
                 // It came about with this probability.
                 e = e.map(|e| e / expected);
@@ -426,39 +331,6 @@ impl Luminaires {
             (0..3).for_each(|band| visible[l][band] += e[band]);
         }
         outcomes
-    }
-}
-
-/// What triangles of a light give to a place unshadowed, the first of them being a number of the light's.
-fn of_few((pieces, fours): (&[Piece], &[Four]), number: usize, place: &Place, factors: &mut Vec<f64>) -> (f64, What) {
-    let first = factors.len();
-    factors.resize(first + pieces.len(), 0.0);
-    let e = unshadowed((pieces, fours), place, &mut factors[first..]);
-    (luminance_of(e), What::Few(number..number + pieces.len(), first, e))
-}
-
-/// Calls back with groups of the triangles of a light that could give light to a place, and what they give or could give.
-fn by_groups(
-    (pieces, fours, tree): (&[Piece], &[Four], &EmitterTree),
-    place: &Place,
-    factors: &mut Vec<f64>,
-    cut: &mut Vec<(u32, f64)>,
-    mut visit: impl FnMut(f64, What),
-) {
-    cut.clear();
-    tree.cut(place.point, place.normal, GROUPS, cut);
-    for &(node, importance) in cut.iter() {
-        let (weight, what) = match tree.leaf(node) {
-            Some(leaf) => {
-                let Range { start, end } = tree.leaves()[leaf];
-                let own = (&pieces[start as usize..end as usize], &fours[leaf..=leaf]);
-                of_few(own, start as usize, place, factors)
-            }
-            None => (importance, What::Many(node)),
-        };
-        if weight > 0.0 {
-            visit(weight, what);
-        }
     }
 }
 
@@ -604,7 +476,9 @@ mod tests {
             // Five standard errors: a false alarm once in two million.
             assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
             assert!(spread < 0.15 * truth, "({x}, {y}): {spread} about {truth}");
-            let single: Vec<f64> = (0..4000).map(|seed| luminaires.sample(0, &tracer, &at, hash(seed))[1]).collect();
+            let mut parts = Parts::default();
+            let mut single = |seed: u32| luminaires.sample(0, &tracer, &at, hash(seed), &mut parts)[1];
+            let single: Vec<f64> = (0..4000).map(&mut single).collect();
             let mean = single.iter().sum::<f64>() / 4000.0;
             let error = (single.iter().map(|e| (e - mean).powi(2)).sum::<f64>()).sqrt() / 4000.0;
             assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");

@@ -5,6 +5,7 @@
 //! seen: there the ray goes on as a path — one light sample, one more ray — and so contacts, shelves and corners are
 //! resolved below the size of the elements.
 
+use crate::parts::Parts;
 use crate::pilot::{AGAIN, Pilot};
 use crate::receivers::Site;
 use crate::rows::IdSpace;
@@ -54,7 +55,7 @@ pub struct Gather<'a> {
     pub area: &'a [f64],
 }
 
-impl Gather<'_> {
+impl<'a> Gather<'a> {
     /// Mean incoming radiosity at each receiver over `rays` rays, as two halves: its indirect irradiance.
     ///
     /// # Errors
@@ -77,9 +78,11 @@ impl Gather<'_> {
                 let i = chunk * CHUNK + k;
                 receivers.site(i).map(|site| (receivers.seed(i), site))
             };
-            let cast = |site: &Site, [u, v, x, y]: [f32; 4], salt: u32| {
+            let mut parts = Parts::default();
+            let mut cast = |site: &Site, [u, v, x, y]: [f32; 4], salt: u32| {
                 let place = site.place(x, y);
-                self.arriving(&place, cosine_direction(&frame(place.normal), f64::from(u), f64::from(v)), salt)
+                let direction = cosine_direction(&frame(place.normal), f64::from(u), f64::from(v));
+                self.arriving(&place, direction, salt, &mut parts)
             };
             for k in 0..means.len() {
                 let Some((seed, site)) = own(k) else { continue };
@@ -104,7 +107,7 @@ impl Gather<'_> {
     }
 
     /// Radiosity that arrives at a place from a direction, without that of the luminaires.
-    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32) -> [f64; 3] {
+    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
         let (mut place, mut direction) = (*from, direction);
         let (mut sum, mut throughput) = ([0f64; 3], [1f64; 3]);
         for bounce in 0.. {
@@ -145,7 +148,7 @@ impl Gather<'_> {
                 return sum;
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
-            let direct = self.one_light(&spot, element as usize, seed);
+            let direct = self.one_light(&spot, element as usize, seed, parts);
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
             let [u, v] = [hash(seed ^ 0x1), hash(seed ^ 0x2)].map(|h| f64::from(unit(h)));
             direction = cosine_direction(&frame(spot.normal), u, v);
@@ -177,7 +180,7 @@ impl Gather<'_> {
 
     /// Direct irradiance at a spot of an element: what the element received, and by how much one light differs from that at
     /// the spot, picked after what it gave the element. Where light is even, that is next to nothing.
-    fn one_light(&self, spot: &Place, element: usize, seed: u32) -> [f64; 3] {
+    fn one_light(&self, spot: &Place, element: usize, seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
         let lights = self.luminaires.lights.len();
         if lights == 0 {
             return [0.0; 3];
@@ -199,7 +202,7 @@ impl Gather<'_> {
             rest -= probability(light);
         }
         let scale = 1.0 / probability(pick);
-        let here = self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4));
+        let here = self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4), parts);
         std::array::from_fn(|band| {
             let all: f64 = received.iter().map(|e| f64::from(e[band])).sum();
             all + scale * (here[band] - f64::from(received[pick][band]))

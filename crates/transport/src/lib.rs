@@ -14,6 +14,7 @@ pub mod luminaires;
 pub mod nodes;
 mod one_light;
 pub mod pair;
+mod parts;
 mod pilot;
 pub mod polygon;
 pub mod receivers;

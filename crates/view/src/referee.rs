@@ -163,11 +163,7 @@ impl<'a> Referee<'a> {
     fn sample_light(&self, place: &Place, p: f64, q: f64, random: &mut Random) -> [f64; 3] {
         let mut sum = [0f64; 3];
         let mut stretched = p;
-        let picked = match self.emitters.is_empty() {
-            true => None,
-            false => self.tree.pick(0, place.point, place.normal, &mut stretched),
-        };
-        if let Some((leaf, probability)) = picked {
+        if let Some((leaf, probability)) = self.tree.pick(0, place.point, place.normal, &mut stretched) {
             let emitter = &self.emitters[self.tree.order()[leaf] as usize];
             let (x, y) = radiosity_scene::elements::triangle_from_square(stretched, q);
             let uv = DVec2::new(x, y);
