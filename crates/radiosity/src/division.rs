@@ -8,7 +8,9 @@
 use radiosity_scene::{Bands, Elements, luminance};
 use radiosity_solve::{DiffuseResponse, SheetResponse};
 use radiosity_trace::{Place, Tracer};
-use radiosity_transport::{ElementReceivers, Exposure, Luminaires, Progress, Receivers, Shadowing, Site, Stopped};
+use radiosity_transport::{
+    ElementReceivers, Exposure, Light, Luminaires, Progress, Receivers, Shadowing, Site, Stopped,
+};
 use rayon::prelude::*;
 
 /// Elements along an edge of a divided cell. In a furnished office points are −1.27 % off with 1, −0.72 % with 2,
@@ -154,7 +156,10 @@ pub(crate) fn divided(
     // Nothing is known yet of what is buried; such places drop out one by one.
     let exposure = Exposure::default();
     let receivers = Cells(ElementReceivers { mesh: tracer.mesh, elements: &cells, exposure: &exposure });
-    let looking = Shadowing { places: PLACES, rays: luminaires.lights.len().min(RAYS) as u32 };
+    // A light of many parts is as many lights.
+    let parts = |light: &Light| if matches!(light, Light::Area { tree: Some(_), .. }) { RAYS } else { 1 };
+    let parts: usize = luminaires.lights.iter().map(parts).sum();
+    let looking = Shadowing { places: PLACES, rays: parts.min(RAYS) as u32 };
     let direct = luminaires.variation(tracer, &receivers, &looking, progress)?;
 
     // Light that goes astray on a sheet does so on both sides.

@@ -27,6 +27,7 @@ pub mod factors;
 mod field;
 mod judge;
 mod lightmap;
+mod mean_path;
 pub mod measure;
 mod monitor;
 mod preview;

@@ -64,14 +64,17 @@ impl Lightmap {
 /// Memory that a texel takes while it is worked out, about.
 pub const TEXEL_BYTES: usize = 400;
 
-/// Texels that the program spends where no density is asked for.
+/// Texels that the program spends where no density is asked for, and how many for each chart where that is more: the corners of
+/// a rectangle.
 pub(crate) const AUTOMATIC_TEXELS: f64 = 200_000.0;
+const CHART_TEXELS: f64 = 4.0;
 
-/// Most texels that are spent for an error: more than a page of 2048 × 2048 is no lightmap for a room any more.
-const MOST_TEXELS: f64 = 4_000_000.0;
+/// Most texels that are spent for an error, relative to those at first: more than a page of 2048 × 2048 is no lightmap for a
+/// room any more.
+const MOST_TEXELS: f64 = 20.0;
 
-/// Most texels that are lit in a round: three times what is lit anyway, and then three times as long.
-const MOST_LIT: f64 = 600_000.0;
+/// Most texels that are lit in a round, relative to those that are lit anyway: it takes three times as long then.
+const MOST_LIT: f64 = 3.0;
 
 /// Rounds after the first map: two or three of finer texels, one to mend what the estimate had wrong.
 const ROUNDS: usize = 4;
@@ -93,10 +96,11 @@ pub fn lightmap(
     let mut params = UnwrapParams { max_page, ..UnwrapParams::default() };
     monitor.stage("unwrap");
     let mut canvas = Canvas::new(&baked.solution, &params)?;
-    params.texels_per_metre =
-        texels_per_metre.or_else(|| canvas.charts.density_for(AUTOMATIC_TEXELS)).unwrap_or(params.texels_per_metre);
-    let texels = canvas.charts.texel_count(params.texels_per_metre);
     let most = (baked.solution.memory_allowed() / TEXEL_BYTES) as f64;
+    let budget = AUTOMATIC_TEXELS.max(CHART_TEXELS * canvas.charts.len() as f64).min(most);
+    params.texels_per_metre =
+        texels_per_metre.or_else(|| canvas.charts.density_for(budget)).unwrap_or(params.texels_per_metre);
+    let texels = canvas.charts.texel_count(params.texels_per_metre);
     if texels > most {
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
@@ -115,11 +119,11 @@ pub fn lightmap(
         let whole = allot(goal.left);
         needed = whole.as_ref().map(|whole| whole.texels);
         // A map that cannot reach it is not begun.
-        if whole.is_none_or(|whole| whole.texels > most.min(MOST_TEXELS)) {
+        if whole.is_none_or(|whole| whole.texels > most.min(MOST_TEXELS * budget)) {
             break;
         }
         let lit = |step: &Allotment| if goal.relight { step.texels } else { step.rough };
-        let Some(step) = allot(goal.left.max(STEP)).filter(|step| lit(step) <= MOST_LIT) else { break };
+        let Some(step) = allot(goal.left.max(STEP)).filter(|step| lit(step) <= MOST_LIT * budget) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
         drawn = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;

@@ -40,6 +40,9 @@ impl Default for MeasureOptions {
 /// over its rays.
 const LOOKED_UP_CELLS: [f64; 2] = [50_000.0, 5_000.0];
 
+/// Cells along the mean path of light at least, however many rooms there are: see what [`crate::bake`] says of its own.
+const CELLS_ON_PATH: f64 = 1.5;
+
 /// Variation of direct light within an element that is looked up, by the error asked.
 const VARIATION: f64 = 5.0;
 
@@ -159,6 +162,7 @@ pub fn measure(
     solve.rays = solve.rays.max(rays_for(options.error, 32.0, 16, 1024));
     let [most, at_one_percent] = LOOKED_UP_CELLS;
     solve.cells = solve.cells.max((at_one_percent * 0.01 / options.error).min(most) as usize);
+    solve.cells_on_path(tracer, CELLS_ON_PATH);
     solve.variation = solve.variation.min(VARIATION * options.error);
     solve.suit_method();
     solve.fit(tracer);

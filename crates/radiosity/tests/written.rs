@@ -79,3 +79,33 @@ fn memory_limits_texels() {
         assert!(map.needed.is_some_and(|texels| texels > map.texels as f64), "{:?}", map.needed);
     });
 }
+
+/// Of thirty thousand flakes in a room each gets few rays, and what is shown is gathered, not read from them.
+#[test]
+fn small_things_get_their_share_of_the_rays() {
+    let grey = Material { base_color: [0.5, 0.5, 0.5, 1.0], ..Material::default() };
+    let lamp = Material { emissive: [100.0; 3], ..grey.clone() };
+    let materials = vec![grey.clone(), lamp, Material { double_sided: true, ..grey }];
+    let mut scene = Scene { materials, up: Up::Z, ..Scene::default() };
+    let sides = DVec3::new(4.0, 3.0, 2.5);
+    for axis in 0..3 {
+        let [x, y, z] = [axis, (axis + 1) % 3, (axis + 2) % 3].map(|k| DVec3::AXES[k] * sides[k]);
+        scene.add_quad("near", 0, [DVec3::ZERO, x, x + y, y]);
+        scene.add_quad("far", 0, [z, z + y, z + x + y, z + x]);
+    }
+    let lamp = |x: f64, y: f64| DVec3::new(2.0 + x, 1.5 + y, 2.49);
+    scene.add_quad("lamp", 1, [lamp(-0.3, -0.3), lamp(-0.3, 0.3), lamp(0.3, 0.3), lamp(0.3, -0.3)]);
+    for k in 0..15_500u32 {
+        let at = DVec3::new(0.01 + 0.03 * f64::from(k % 125), 0.01 + 0.023 * f64::from(k / 125), 0.5);
+        let [x, y] = [DVec3::new(0.004, 0.0, 0.001), DVec3::new(0.0, 0.004, 0.002)];
+        scene.add_quad("flake", 2, [at, at + x, at + x + y, at + y]);
+    }
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let baked = bake(&tracer, &BakeOptions { error: 0.1, ..BakeOptions::default() }, &()).unwrap();
+    assert!(baked.achieved && baked.gather > 0, "{:?}", baked.rounds);
+    let elements = &baked.solution.elements;
+    let shares = (0..elements.len() as u32).map(|e| elements.share(&mesh, e));
+    let (small, rays): (usize, f64) = shares.filter(|share| *share < 0.1).fold((0, 0.0), |(n, s), x| (n + 1, s + x));
+    assert!(small >= 2 * 31_000 && rays < 0.02 * small as f64, "{small} small elements have {rays} cells' rays");
+}
