@@ -7,11 +7,12 @@ import { lay, read, type Grid } from './grid';
 import { beside, lampAhead, type Lamp, type LampKind } from './lamps';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
+import { BORDER, HEIGHT, PlaneAsker, type WorkingPlane } from './plane';
 import { corners, Stage, type Hit } from './stage';
 import { Mode, shared, Surface } from './surface';
 import {
   Connection, type CameraPlace, type Edit, type Layer, type LightFrame, type LightNotice, type MeshFrame, type Notice,
-  type ObjectNotice, type ProbeAnswer, type SceneNotice, type StatusNotice, type TextureUse,
+  type ObjectNotice, type PlaneAnswer, type ProbeAnswer, type SceneNotice, type StatusNotice, type TextureUse,
 } from './wire';
 
 /** What can change. */
@@ -61,6 +62,10 @@ export class App {
   lampKind: LampKind = 'point';
   probed: Probed | null = null;
   grid: Grid | null = null;
+  /** A working plane; it or the grid is laid, not both. */
+  plane: WorkingPlane | null = null;
+  planeHeight = HEIGHT;
+  planeBorder = BORDER;
   message = '';
   private objectsAhead = new Ahead(this.objects, (object) => this.arrange(object.id));
   private lightsAhead = new Ahead(this.lights, (light) => this.shed(light));
@@ -74,6 +79,7 @@ export class App {
   private loosened = new Set<number>();
   private textures = new Map<string, Texture>();
   private question = 0;
+  private planes = new PlaneAsker(this);
   private gesture = 0;
   private pending: { gesture?: number; send: () => void; timer: number } | null = null;
   private lastSent = 0;
@@ -169,6 +175,9 @@ export class App {
           this.tell('probe');
         }
         break;
+      case 'plane':
+        if (this.planes.hear(notice.question)) this.tellPlane(notice.answer, notice.why);
+        break;
       case 'rays':
         if (notice.question === this.question) this.marks.rays(notice.rays);
         break;
@@ -185,6 +194,7 @@ export class App {
     this.isCaughtUp = true;
     this.opened ??= performance.now();
     if (this.selected === null) this.navigator.choose();
+    this.planes.begin();
     this.tell('view');
     this.tell('connection');
   }
@@ -194,6 +204,7 @@ export class App {
     this.stage.put(surface);
     // What was laid on the old one, before the connection was lost, lies on the new one.
     if (this.grid?.surface.object === frame.object) this.grid.surface = surface;
+    if (this.plane?.surface.object === frame.object) this.plane.surface = surface;
     if (this.probed?.hit.surface.object === frame.object) this.probed.hit.surface = surface;
     this.arrange(frame.object);
   }
@@ -217,7 +228,7 @@ export class App {
       this.gizmo.place();
       this.tellSoon('selection');
     }
-    if (object.deleted && this.grid?.surface === surface) this.clearGrid();
+    if (object.deleted && (this.grid ?? this.plane)?.surface === surface) this.clearGrid();
     if (this.edges) this.marks.edges(this.stage.surfaces);
     this.stage.change();
   }
@@ -302,6 +313,7 @@ export class App {
     this.asked = now;
     this.askProbe();
     this.readGrid();
+    this.planes.ask();
   }
 
   private asked = '';
@@ -669,10 +681,46 @@ export class App {
   /** Lays a grid of measuring points over the surface that was picked. */
   measure(): void {
     if (!this.probed) return this.say('Pick a point of a surface first: the grid is laid over it.');
+    this.plane = null;
+    this.marks.plane(null);
     this.grid = lay(this.probed.hit);
     if (!this.grid) this.say('There is no plane surface to lay a grid over.');
     this.marks.grid(this.grid);
     this.tell('grid');
+    this.tell('view');
+  }
+
+  /** Lays a working plane above the floor that was picked. */
+  measurePlane(): void {
+    if (!this.probed) return this.say('Pick a point of a floor first: the working plane is laid above it.');
+    this.clearGrid();
+    this.say('');
+    const { surface, triangle, uv } = this.probed.hit;
+    this.plane = { surface, triangle, uv, height: this.planeHeight, border: this.planeBorder, answer: null };
+    this.planes.begin();
+    this.tell('grid');
+  }
+
+  /** The plane that is laid gets another height or another zone along the walls, metres. */
+  setPlane(height: number, border: number): void {
+    [this.planeHeight, this.planeBorder] = [height, border];
+    if (this.plane) {
+      Object.assign(this.plane, { height, border });
+      this.planes.begin();
+    }
+    this.tell('grid');
+  }
+
+  private tellPlane(answer: PlaneAnswer | null, why: string | null): void {
+    if (!this.plane) return;
+    if (!answer) {
+      this.clearGrid();
+      return this.say(why ?? '');
+    }
+    this.plane.answer = answer;
+    this.marks.plane(answer);
+    this.tell('grid');
+    this.tell('view');
   }
 
   /** The grid where its surface is now, in the light of now. */
@@ -684,9 +732,11 @@ export class App {
   }
 
   clearGrid(): void {
-    this.grid = null;
+    this.grid = this.plane = null;
     this.marks.grid(null);
+    this.marks.plane(null);
     this.tell('grid');
+    this.tell('view');
   }
 
   look(place: CameraPlace): void {

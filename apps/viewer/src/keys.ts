@@ -32,7 +32,7 @@ const LIST: [string, [string, string][]][] = [
   ['Measure and change', [
     ['Enter', 'measure and select what is under the cross'],
     ['P  Shift+P', 'select the next thing or lamp, the one before'],
-    ['G', 'grid on the picked surface'],
+    ['G  Shift+G', 'grid on the picked surface, on a working plane above it'],
     ['J K', 'move the selected left, right'],
     ['U O', 'move it away, towards you'],
     ['Page ↑ ↓', 'move it up, down'],
@@ -124,7 +124,7 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     '-': () => app.exposure.set(app.exposure.value - 0.25),
     '0': () => app.exposure.automatic(),
     enter: () => app.pick(0, 0),
-    g: () => app.measure(),
+    g: (event) => (event.shiftKey ? app.measurePlane() : app.measure()),
     p: (event) => app.selectNext(event.shiftKey ? -1 : 1),
     y: () => app.lookFreely(),
     m: () => app.gizmo.setMode(app.gizmo.mode === 'translate' ? 'rotate' : 'translate'),

@@ -2,6 +2,7 @@
 import { Vector3 } from 'three';
 import type { App } from './app';
 import { el } from './panels/parts';
+import { measured } from './plane';
 import { PALETTE, readable } from './scale';
 import { shared } from './surface';
 
@@ -12,9 +13,10 @@ export function legend(app: App): HTMLElement {
   const unit = el('span', { class: 'unit' }, 'lx');
   const element = el('aside', { class: 'legend', id: 'legend', 'aria-label': 'Scale of illuminance' }, unit, el('div', { class: 'scale' }, bar, marks));
   app.on('view', () => {
-    const isShown = app.falseColours || app.layer === 'error' || shared.isolines.value;
-    element.hidden = !isShown;
-    bar.hidden = !(app.falseColours || app.layer === 'error');
+    const isColoured = app.falseColours || app.layer === 'error' || Boolean(app.plane?.answer);
+    element.hidden = !isColoured && !shared.isolines.value;
+    bar.hidden = !isColoured;
+    app.marks.colourPlane();
     const [low, high] = app.exposure.range;
     const place = (value: number) => (100 * Math.log(value / low)) / Math.log(high / low);
     marks.replaceChildren(...app.exposure.levels.map((level) => el('span', { style: `bottom:${place(level)}%` }, readable(level))));
@@ -49,7 +51,7 @@ export function gridNumbers(app: App): { element: HTMLElement; update(): void } 
   };
   app.on('grid', () => {
     last = '';
-    const points = app.grid?.points ?? [];
+    const points = measured(app);
     const every = Math.ceil(points.length / WRITTEN) || 1;
     spans = points.filter((_, i) => i % every === 0).map(({ point, lux }) => ({ point, span: el('span', {}, readable(lux)) }));
     element.replaceChildren(...spans.map(({ span }) => span));

@@ -1,18 +1,25 @@
-// What is drawn over the scene: the probe, the outline of what is selected, edges of elements, rays, a grid, lights without area.
+// What is drawn over the scene: the probe, the outline of what is selected, edges of elements, rays, a grid, a working plane, lights
+// without area.
 import {
-  BufferAttribute, BufferGeometry, CanvasTexture, Color, Group, LineBasicMaterial, LineSegments, Mesh,
-  MeshBasicMaterial, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, Vector3, WireframeGeometry,
+  BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh,
+  MeshBasicMaterial, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, SRGBColorSpace, Vector3, WireframeGeometry,
 } from 'three';
 import type { Grid } from './grid';
+import { falseColour } from './scale';
 import { ACCENT, discard, type Hit, type Stage } from './stage';
-import type { Surface } from './surface';
-import type { LightNotice } from './wire';
+import { shared, type Surface } from './surface';
+import type { LightNotice, PlaneAnswer } from './wire';
+
+/** How much of a cell its colour fills along each side, so that cells are told apart; and how much of what is behind it hides. */
+const FILL = 0.94;
+const COVER = 0.85;
 
 export class Marks {
   private wires = new Map<number, LineSegments>();
   private ring: Group | null = null;
   private lines: LineSegments | null = null;
   private gridded: Group | null = null;
+  private cells: { mesh: Mesh; answer: PlaneAnswer; range: number[] } | null = null;
   readonly lamps = new Map<number, Sprite>();
   private lampPicture: CanvasTexture | null = null;
 
@@ -107,6 +114,44 @@ export class Marks {
       this.gridded = new Group().add(dots);
       this.stage.tools.add(this.gridded);
     }
+    this.stage.change();
+  }
+
+  /** Cells of a working plane in false colours. */
+  plane(answer: PlaneAnswer | null): void {
+    if (this.cells) discard(this.cells.mesh);
+    this.cells = null;
+    if (answer) {
+      const [u, v] = answer.axes.map((axis, k) => new Vector3().fromArray(axis).multiplyScalar((FILL * answer.cell[k]) / 2));
+      const above = u.clone().cross(v).normalize().multiplyScalar(1e-3);
+      const corners = answer.points.flatMap(([x, y, z]) => {
+        const corner = (i: number, j: number) => new Vector3(x, y, z).add(above).addScaledVector(u, i).addScaledVector(v, j);
+        const [a, b, c, d] = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+        return [a, b, c, a, c, d];
+      });
+      const geometry = new BufferGeometry().setFromPoints(corners);
+      geometry.setAttribute('color', new BufferAttribute(new Float32Array(3 * corners.length), 3));
+      const material = new MeshBasicMaterial({ vertexColors: true, transparent: true, opacity: COVER, side: DoubleSide, depthWrite: false, toneMapped: false });
+      this.cells = { mesh: new Mesh(geometry, material), answer, range: [] };
+      this.colourPlane();
+      this.stage.overlay.add(this.cells.mesh);
+    }
+    this.stage.change();
+  }
+
+  /** The colours of the working plane, by the scale of now. */
+  colourPlane(): void {
+    const range = shared.range.value;
+    if (!this.cells || range === this.cells.range) return;
+    const { mesh, answer } = this.cells;
+    this.cells.range = range;
+    const colours = mesh.geometry.attributes.color;
+    answer.points.forEach(([, , , lux], cell) => {
+      const [r, g, b] = falseColour(lux, range);
+      const colour = new Color().setRGB(r, g, b, SRGBColorSpace);
+      for (let k = 0; k < 6; k += 1) colours.setXYZ(6 * cell + k, colour.r, colour.g, colour.b);
+    });
+    colours.needsUpdate = true;
     this.stage.change();
   }
 

@@ -6,6 +6,14 @@ export const PALETTE: [number, number, number][] = [
   [252, 255, 164],
 ].map(([r, g, b]) => [r / 255, g / 255, b / 255]);
 
+/** The colour of an illuminance on a scale, as the surfaces have it. */
+export function falseColour(lux: number, [low, high]: number[]): number[] {
+  const share = Math.log(Math.max(lux, 1e-9) / low) / Math.log(high / low);
+  const at = Math.min(1, Math.max(0, share)) * (PALETTE.length - 1);
+  const i = Math.min(Math.floor(at), PALETTE.length - 2);
+  return PALETTE[i].map((x, k) => x + (at - i) * (PALETTE[i + 1][k] - x));
+}
+
 /** Most lines of equal illuminance. */
 export const LEVELS = 24;
 

@@ -342,6 +342,11 @@ export class Stage {
     return seen;
   }
 
+  /** A point of the scene in the world. */
+  toWorld(point: readonly number[]): Vector3 {
+    return this.root.localToWorld(new Vector3().fromArray(point as number[]));
+  }
+
   /** A point of the world in the scene's axes. */
   toScene(point: Vector3): Vector3 {
     return this.root.worldToLocal(point.clone());

@@ -102,6 +102,7 @@ export function tests(app: App) {
         least: app.grid.least, mean: app.grid.mean, largest: app.grid.largest, count: app.grid.points.length, cell: app.grid.cell, size: app.grid.size,
         first: app.grid.points[0].point.toArray(),
       },
+      plane: app.plane && { height: app.plane.height, border: app.plane.border, ...app.plane.answer },
       layer: app.layer,
       probe: app.probed?.answer ?? null,
       exposure: app.exposure.value,

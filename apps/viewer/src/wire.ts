@@ -109,6 +109,28 @@ export interface ProbeAnswer {
   surfaces: Share[];
 }
 
+/** What was measured on a working plane. */
+export interface PlaneAnswer {
+  /** Place in the scene's axes, metres, and illuminance, lx. */
+  points: [number, number, number, number][];
+  /** Sides of the plane and of a cell, metres, and unit vectors along them. */
+  size: [number, number];
+  cell: [number, number];
+  axes: [number[], number[]];
+  /** Whether cells are larger than the standard has them. */
+  is_coarse: boolean;
+  least: number;
+  mean: number;
+  most: number;
+  uniformity: number;
+  /** Standard error of a point by its rays, over the mean. */
+  error: number;
+  /** Edits that are in it. */
+  edits: number;
+  /** Whether the light will stay as it is. */
+  is_done: boolean;
+}
+
 /** What was refused: a change of the scene, a camera to keep, to follow changes in the layer that is shown, or a message
  *  that is none. The message is for people. */
 export interface RefusedNotice {
@@ -127,6 +149,7 @@ export type Notice =
   | { kind: 'history'; undo: string | null; redo: string | null }
   | { kind: 'caught_up' }
   | { kind: 'probe'; question: number; answer: ProbeAnswer | null }
+  | { kind: 'plane'; question: number; answer: PlaneAnswer | null; why: string | null }
   | { kind: 'rays'; question: number; rays: number[][][] }
   | RefusedNotice;
 
@@ -167,6 +190,7 @@ export type Request =
   | { kind: 'redo' }
   | { kind: 'layer'; layer: Layer; epoch: number }
   | { kind: 'probe'; question: number; object: number; triangle: number; uv: [number, number] }
+  | { kind: 'plane'; question: number; about: { object: number; triangle: number; uv: [number, number]; height: number; border: number } }
   | { kind: 'rays'; question: number; object: number; triangle: number }
   | { kind: 'bookmark'; camera: CameraPlace }
   | { kind: 'forget'; name: string };

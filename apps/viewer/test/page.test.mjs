@@ -1,10 +1,10 @@
 // The page in a browser, against the program.
 import assert from 'node:assert/strict';
-import { writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, done, folder, luxOf, NEAR, picture, restored, state, stuck, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, picture, restored, state, stuck, view } from './program.mjs';
 import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
@@ -98,6 +98,83 @@ test('a measuring grid stays where it was laid, as fine as the standard asks', a
   await page.waitForFunction((mean) => window.radiosity.state().grid.mean > 0 && window.radiosity.state().grid.mean < 0.98 * mean, grid.mean);
   assert.match(await page.locator('#grid .warning').textContent(), /Direct light/);
   await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('a working plane lies in the air of the room, as `measure` has it, and follows changes', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const plane = () => state(page).then(({ plane }) => plane);
+  const answered = (edits) => page.waitForFunction((edits) => {
+    const { plane } = window.radiosity.state();
+    return plane?.is_done && plane.edits >= edits;
+  }, edits);
+  const { edits } = (await state(page)).status;
+  // The box is half a metre high: at desk height there is no room, and the page says so.
+  await page.evaluate(() => {
+    document.querySelector('#grid').open = true;
+    window.radiosity.app.pick(0, -0.9);
+  });
+  await page.locator('#grid button', { hasText: 'Working plane' }).click();
+  await page.waitForFunction(() => /No working plane/.test(window.radiosity.state().message));
+  assert.equal(await plane(), null);
+  const write = async (label, text) => {
+    await page.locator(`#grid input[aria-label^="${label}"]`).fill(text);
+    await page.keyboard.press('Enter');
+  };
+  await write('Height', '0.1');
+  await write('Zone', '0.04');
+  await page.evaluate(() => window.radiosity.app.stage.canvas.focus());
+  await page.keyboard.press('Shift+G');
+  await answered(edits);
+  const laid = await plane();
+  assert.ok(laid.points.length >= 8 && laid.points.every(([x, y, z]) => Math.abs(y - 0.1) < 1e-6 && Math.min(x, z) > 0.04 && Math.max(x, z) < 0.53), `${JSON.stringify(laid)}`);
+  const lux = laid.points.map((point) => point[3]);
+  assert.ok(Math.abs(laid.mean - lux.reduce((a, b) => a + b) / lux.length) < 1e-3 * laid.mean);
+  assert.ok(Math.abs(laid.least - Math.min(...lux)) < 1e-3 && Math.abs(laid.uniformity - laid.least / laid.mean) < 1e-3);
+  const truth = await measured(page, laid.points.map(([x, y, z]) => [x, y, z, 0, 1, 0]));
+  const off = difference(lux, truth);
+  console.log(`a working plane of ${lux.length} points: ${(100 * off).toFixed(1)} % from a batch solve, told ${(100 * laid.error).toFixed(2)} % noise`);
+  assert.ok(off < NEAR, `${off}`);
+  assert.match(await page.locator('#grid .facts').innerText(), new RegExp(`Points\\s*${lux.length}`));
+  assert.ok((await page.locator('.numbers-over span:visible').count()) > 3, 'numbers on the picture');
+  assert.equal(await page.locator('#legend').isVisible(), true);
+  await picture(page, 'plane');
+
+  // A thing put where points were takes them away and frees others, a dimmed lamp halves what is left; undone, all is as before.
+  const block = (await state(page)).objects.find(({ name }) => name === 'short block');
+  await page.evaluate((id) => {
+    const { app } = window.radiosity;
+    app.select(id);
+    app.nudge(app.stage.camera.position.clone().set(0.12, 0, 0.02), 0);
+    app.setLight(app.lights.get(0), { dimming: 0.5 });
+  }, block.id);
+  await done(page, edits + 2);
+  await answered(edits + 2);
+  const after = await plane();
+  assert.ok(after.mean < 0.6 * laid.mean && after.mean > 0.3 * laid.mean, `${after.mean} ${laid.mean}`);
+  assert.notDeepEqual(after.points.map(([x, y, z]) => [x, y, z]), laid.points.map(([x, y, z]) => [x, y, z]));
+  const now = difference(after.points.map((point) => point[3]), await measured(page, after.points.map(([x, y, z]) => [x, y, z, 0, 1, 0])));
+  assert.ok(now < NEAR, `${now}`);
+
+  // What is saved is what `measure` reads.
+  const [download] = await Promise.all([page.waitForEvent('download'), page.locator('#grid button', { hasText: 'CSV' }).click()]);
+  const [names, ...rows] = readFileSync(await download.path(), 'utf8').trim().split('\n');
+  assert.deepEqual([names, rows.length, download.suggestedFilename()], ['x,y,z,nx,ny,nz,illuminance_lux', after.points.length, 'cornell-box-plane.csv']);
+  rows.forEach((row, i) => {
+    const [x, y, z, nx, ny, nz, lx] = row.split(',').map(Number);
+    const [px, py, pz, right] = after.points[i];
+    assert.ok(Math.hypot(x - px, y - py, z - pz) < 1e-4 && Math.hypot(nx, ny - 1, nz) < 1e-6 && Math.abs(lx / right - 1) < 1e-4, row);
+  });
+  await restored(page);
+  await answered(edits + 4);
+  assert.deepEqual((await plane()).points, laid.points, 'to the last bit');
+
+  // The other grid takes its place, and it goes with its floor.
+  await page.keyboard.press('Escape');
+  await page.keyboard.press('g');
+  assert.deepEqual([await plane(), (await state(page)).grid.count > 4], [null, true]);
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });

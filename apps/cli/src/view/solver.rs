@@ -2,8 +2,10 @@
 
 use super::board::{Board, Notice, Subject};
 use super::history::{self, Gesture, History, targets};
-use super::wire::{self, CameraPlace, ProbeAnswer, Refused, Request, Say, Share};
-use radiosity::session::{Edit, EditError, Layer, LightKind, Model, ObjectId, Probe, Session};
+use super::wire::{self, CameraPlace, PlaneAnswer, ProbeAnswer, Refused, Request, Say, Share};
+use radiosity::session::{
+    Edit, EditError, Layer, LightKind, Model, ObjectId, Plane, PlaneError, PlaneReading, Probe, Session,
+};
 use radiosity::{Bands, Scene, luminance};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -73,12 +75,22 @@ pub struct Solver {
     /// would be seen before the gesture ends.
     held: Option<(Command, Instant)>,
     latency: Option<f64>,
+    /// Planes that pages wait for, one of each page at most.
+    planes: Vec<Asked>,
     /// Since when rays have been traced without a change, and how many there were.
     since: (Instant, u32),
     /// Since when all rays have been there but for what edits have changed; none before.
     settling: Option<Instant>,
     /// Seconds that it took last from there to the end.
     settled: Option<f64>,
+}
+
+/// A plane that a page waits for.
+struct Asked {
+    page: u64,
+    question: u64,
+    plane: Plane,
+    answer: mpsc::Sender<String>,
 }
 
 /// A layer that pages look at.
@@ -118,6 +130,7 @@ impl Solver {
             edited: None,
             held: None,
             latency: None,
+            planes: Vec::new(),
             since: (Instant::now(), 0),
             settling: None,
             settled: None,
@@ -131,7 +144,7 @@ impl Solver {
     pub fn run(mut self, mut commands: mpsc::Receiver<Command>) {
         loop {
             let mut waiting: Vec<Command> = Vec::new();
-            if self.is_done && self.held.is_none() {
+            if self.is_done && self.held.is_none() && self.planes.is_empty() {
                 match commands.blocking_recv() {
                     Some(command) => waiting.push(command),
                     None => return,
@@ -149,6 +162,9 @@ impl Solver {
                 return;
             }
             self.work();
+            if self.edited.is_none() {
+                self.measure_planes();
+            }
         }
     }
 
@@ -175,6 +191,10 @@ impl Solver {
     /// Does what was asked at a time; whether to go on.
     fn obey(&mut self, command: Command, since: Instant) -> bool {
         match command {
+            Command::Ask { page, request: Request::Plane { question, about }, answer } => {
+                self.planes.retain(|asked| asked.page != page);
+                self.planes.push(Asked { page, question, plane: Plane::new(about), answer });
+            }
             Command::Ask { page, request, answer } => {
                 if let Some(text) = self.answer(page, &request, since) {
                     // A page that does not read its answers misses them.
@@ -214,8 +234,8 @@ impl Solver {
                 self.post_history();
                 None
             }
-            // The board keeps who looks at what.
-            Request::Layer { .. } => None,
+            // The board keeps who looks at what, and planes wait until there is time.
+            Request::Layer { .. } | Request::Plane { .. } => None,
             Request::Probe { question, object, triangle, uv } => {
                 let is_place = uv.iter().all(|x| x.is_finite());
                 let probe = self.session.probe(*object, *triangle, *uv).filter(|_| is_place);
@@ -447,6 +467,42 @@ impl Solver {
             lights,
             surfaces: shares(std::iter::once(straight).chain(surfaces)),
         }
+    }
+
+    /// Works a little on planes that pages wait for.
+    fn measure_planes(&mut self) {
+        let started = Instant::now();
+        self.planes.retain(|asked| !asked.answer.is_closed());
+        while let Some(asked) = self.planes.first_mut() {
+            let measured = self.session.measure_plane(&mut asked.plane, SLICE.saturating_sub(started.elapsed()));
+            let Some(measured) = measured.transpose() else { return };
+            let Asked { question, answer, .. } = self.planes.remove(0);
+            // A page that does not read its answers misses them.
+            let _ = answer.try_send(self.tell_plane(question, measured));
+        }
+    }
+
+    fn tell_plane(&self, question: u64, measured: Result<PlaneReading, PlaneError>) -> String {
+        let why = measured.as_ref().err().map(|error| format!("No working plane: {error}."));
+        let answer = measured.ok().map(|reading| PlaneAnswer {
+            points: reading
+                .points
+                .iter()
+                .map(|p| [p.position[0], p.position[1], p.position[2], p.lux.into()])
+                .collect(),
+            size: reading.size,
+            cell: reading.cell,
+            axes: reading.axes,
+            is_coarse: reading.is_coarse,
+            least: reading.least,
+            mean: reading.mean,
+            most: reading.most,
+            uniformity: reading.uniformity,
+            error: reading.error,
+            edits: self.edits,
+            is_done: self.is_done,
+        });
+        Say::Plane { question, answer, why }.text()
     }
 
     fn export(&self) -> Export {

@@ -12,7 +12,7 @@ use super::board::{CHUNK, LightChunk};
 use axum::body::Bytes;
 use glam::{DVec2, DVec3};
 use half::f16;
-use radiosity::session::{Edit, Layer, LightId, ModelLight, ModelObject, ObjectId};
+use radiosity::session::{Edit, Layer, LightId, ModelLight, ModelObject, ObjectId, PlaneQuestion};
 use radiosity::{Bands, Scene, Surface, Texture, TextureRef, Wrap};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
@@ -63,6 +63,11 @@ pub enum Request {
         object: ObjectId,
         triangle: u32,
         uv: [f32; 2],
+    },
+    /// Measures on a working plane. Of several that a page asks for, the last is answered.
+    Plane {
+        question: u64,
+        about: PlaneQuestion,
     },
     /// Asks for the rays of an element.
     Rays {
@@ -137,6 +142,12 @@ pub enum Say<'a> {
         question: u64,
         answer: Option<ProbeAnswer>,
     },
+    Plane {
+        question: u64,
+        /// None if there is no such plane; then why not.
+        answer: Option<PlaneAnswer>,
+        why: Option<String>,
+    },
     Rays {
         question: u64,
         rays: Vec<[[f32; 3]; 2]>,
@@ -200,6 +211,28 @@ pub struct ProbeAnswer {
     pub lights: Vec<Share>,
     /// From where it arrives: straight from lights, or from surfaces that reflect it.
     pub surfaces: Vec<Share>,
+}
+
+/// What was measured on a working plane.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlaneAnswer {
+    /// Place in the scene, metres, and illuminance, lx.
+    pub points: Vec<[f64; 4]>,
+    pub size: [f64; 2],
+    pub cell: [f64; 2],
+    /// Unit vectors along the sides.
+    pub axes: [[f64; 3]; 2],
+    pub is_coarse: bool,
+    pub least: f32,
+    pub mean: f32,
+    pub most: f32,
+    pub uniformity: f32,
+    /// Standard error of a point over the mean.
+    pub error: f32,
+    /// Edits that are in it.
+    pub edits: u64,
+    /// Whether the light will stay as it is.
+    pub is_done: bool,
 }
 
 /// A share of the illuminance of a place.

@@ -1,9 +1,11 @@
 // What is measured: at a point, and on a grid.
 import type { App } from '../app';
+import { savePoints } from '../files';
 import { luminance } from '../luminance';
+import { lateness } from '../plane';
 import { readable } from '../scale';
 import type { Share } from '../wire';
-import { button, el, fact, hex, section } from './parts';
+import { button, el, fact, hex, isOpen, section } from './parts';
 import { layerName } from './view';
 
 export function meterPanel(app: App): HTMLElement {
@@ -43,28 +45,50 @@ function bar({ name, share }: Share): HTMLElement {
 
 export function gridPanel(app: App): HTMLElement {
   const facts = el('div', { class: 'facts' });
-  const layer = el('p', { class: 'warning' });
+  const warning = el('p', { class: 'warning' });
   const metres = (sides: number[]) => `${sides.map((side) => side.toFixed(2)).join(' × ')} m`;
   const clear = button('Take away', () => app.clearGrid());
+  const csv = button('Save points as CSV', () => savePoints(app));
+  const length = (label: string) => el('input', { type: 'number', min: 0, step: 0.05, 'aria-label': `${label}, metres`, change: () => set() });
+  const [height, border] = [length('Height of the working plane'), length('Zone along walls that is left out')];
+  const set = () => {
+    const lengths = [height, border].map((input) => input.valueAsNumber);
+    if (lengths.every((metres) => metres >= 0)) app.setPlane(lengths[0], lengths[1]);
+    else app.say('Height and zone are metres, 0 or more.');
+  };
+  const field = (label: string, input: HTMLElement) =>
+    el('label', { class: 'row' }, el('span', { class: 'quiet' }, label), el('span', { class: 'grow' }), input, el('span', { class: 'unit' }, 'm'));
   app.on('grid', () => {
-    clear.hidden = !app.grid;
-    facts.hidden = !app.grid;
-    layer.hidden = !app.grid || app.layer === 'total';
-    if (!app.grid) return;
-    layer.textContent = `Not all light, but the layer that is shown: ${layerName(app, app.layer)}.`;
-    const { least, mean, largest, uniformity, points, cell, size, isCoarse } = app.grid;
+    const { grid, plane } = app;
+    for (const [input, value] of [[height, app.planeHeight], [border, app.planeBorder]] as const) {
+      if (!isOpen(input)) input.value = String(value);
+    }
+    clear.hidden = !grid && !plane;
+    warning.textContent = grid && app.layer !== 'total'
+      ? `Not all light, but the layer that is shown: ${layerName(app, app.layer)}.`
+      : [lateness(app), plane && app.layer !== 'total' ? 'Of all light, whichever layer is shown.' : ''].filter(Boolean).join(' ');
+    warning.hidden = !warning.textContent;
+    const answer = plane?.answer;
+    const told = grid ?? (answer && { ...answer, largest: answer.most, isCoarse: answer.is_coarse });
+    csv.hidden = facts.hidden = !told;
+    if (!told) return;
+    const { least, mean, largest, uniformity, points, cell, size, isCoarse } = told;
     facts.replaceChildren(
       fact('Mean', `${readable(mean)} lx`),
       fact('Least', `${readable(least)} lx`),
       fact('Most', `${readable(largest)} lx`),
       fact('Uniformity', uniformity.toFixed(2)),
       fact('Points', String(points.length)),
+      ...(answer ? [fact('Noise of a point', `± ${(100 * answer.error).toPrecision(2)} %`)] : []),
       fact('Cells', metres(cell) + (isCoarse ? ', coarser than the standard' : '')),
-      fact('Surface', metres(size)),
+      fact(answer ? 'Plane' : 'Surface', metres(size)),
     );
   });
-  app.on('view', () => { if (app.grid) app.tell('grid'); });
+  for (const topic of ['view', 'status'] as const) app.on(topic, () => { if (app.grid || app.plane) app.tell('grid'); });
   return section('grid', 'Measuring grid', false,
-    el('p', { class: 'quiet' }, 'Over the whole plane that was picked, in cells no larger than EN 12464-1 asks. It stays there until another is laid.'),
-    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G' }), clear), layer, facts);
+    el('p', { class: 'quiet' }, 'Cells are no larger than EN 12464-1 asks. A grid stays until another is laid.'),
+    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G', title: 'Over the whole plane that was picked, in the layer that is shown' })),
+    el('div', { class: 'row' }, button('Working plane above it', () => app.measurePlane(), { key: 'Shift+G', title: 'In the air above the picked floor, as far as the room goes; points within things are left out' })),
+    field('Height above it', height), field('Left out along walls', border),
+    warning, facts, el('div', { class: 'row' }, csv, clear));
 }

@@ -65,7 +65,7 @@ export function viewPanel(app: App): HTMLElement {
     layer.value = JSON.stringify(app.layer);
     resting.textContent = app.resting;
     resting.hidden = !app.resting;
-    scale.hidden = !app.falseColours && !shared.isolines.value && app.layer !== 'error';
+    scale.hidden = !app.falseColours && !shared.isolines.value && app.layer !== 'error' && !app.plane;
     for (const [input, value] of [[low, app.exposure.range[0]], [high, app.exposure.range[1]]] as const) {
       if (!isOpen(input)) input.value = String(Number(value.toPrecision(3)));
     }

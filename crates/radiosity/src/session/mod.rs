@@ -38,6 +38,7 @@ mod edited;
 mod light;
 mod model;
 mod paint;
+mod plane;
 mod probe;
 mod solve;
 mod state;
@@ -46,6 +47,7 @@ pub use edit::{
     Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
 };
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
+pub use plane::{Plane, PlaneError, PlanePoint, PlaneQuestion, PlaneReading};
 
 use crate::Error;
 use display::Display;

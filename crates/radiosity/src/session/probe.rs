@@ -16,9 +16,6 @@ const MOST_BOUNCES: u32 = 64;
 /// Layers that are kept, so that several pages may look at several, and bounces follow from those before them.
 const MOST_KEPT: usize = 8;
 
-/// An object that is less than this part of the scene wide is taken for one that can be moved.
-const MOVABLE: f64 = 0.5;
-
 impl Session {
     fn display(&self, object: usize) -> &Display {
         let placed = &self.objects[object];
@@ -52,7 +49,6 @@ impl Session {
     /// Brings a model of this session up to date. Triangles, which stay as they are, are made for new objects alone.
     pub fn update_model(&self, model: &mut Model) {
         let world = self.live.world();
-        let extent = |low: glam::DVec3, high: glam::DVec3| (high - low).max_element();
         let mut bounds: Option<[glam::DVec3; 2]> = None;
         for (index, (placed, body)) in self.objects.iter().zip(&world.bodies).enumerate() {
             if body.is_present {
@@ -103,7 +99,7 @@ impl Session {
             known.tint = std::array::from_fn(|band| base[band] * scale[band]);
             known.emission = std::array::from_fn(|band| mean[band] * factor[band]);
             known.deleted = !body.is_present;
-            known.movable = extent(body.bounds.low, body.bounds.high) < MOVABLE * 2.0 * world.half;
+            known.movable = self.is_movable(index);
             known.light = placed.light.map(|light| LightId(light as u32));
         }
         model.lights = self.model_lights();

@@ -139,6 +139,11 @@ pub struct Site {
 }
 
 impl Site {
+    /// A point in the air with a unit normal.
+    pub fn in_the_air(point: DVec3, normal: DVec3) -> Site {
+        Site { origin: point, edges: [DVec3::ZERO; 2], normal, centre: point, radius: 0.0, triangle: u32::MAX }
+    }
+
     /// The place that (x, y) in the unit square maps to.
     #[inline]
     pub fn place(&self, x: f32, y: f32) -> Place {
@@ -231,6 +236,19 @@ impl Body {
         let (t, _, _) = self.shape.place(element);
         let [a, b, c] = self.corners[t];
         0.5 * (b - a).cross(c - a).length() / f64::from(self.shape.division[t].pow(2))
+    }
+
+    /// How many times the surface goes around a point, fronts outwards: the solid angle that it fills over 4π (van Oosterom and
+    /// Strackee 1983; Jacobson, Kavan and Sorkine-Hornung 2013). 1 inside a closed solid, 0 outside, and near to that where
+    /// the solid has small holes.
+    pub fn winding(&self, point: DVec3) -> f64 {
+        let half_angle = |corners: &[DVec3; 3]| {
+            let [a, b, c] = corners.map(|corner| corner - point);
+            let [la, lb, lc] = [a, b, c].map(DVec3::length);
+            let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            a.dot(b.cross(c)).atan2(denominator)
+        };
+        self.corners.iter().map(half_angle).sum::<f64>() / std::f64::consts::TAU
     }
 
     /// Where an element lies; `offset` is that of ray origins.

@@ -28,7 +28,7 @@ pub const NEAR_RAYS: u32 = 64;
 pub const NEAR_SHADOWS: u32 = 4;
 
 /// The stream of sample points that rows use.
-const ROWS: u32 = 0x0100;
+pub const ROWS: u32 = 0x0100;
 
 /// Rays next to one that tell whether it starts inside a solid. More blur the outline of what is buried, fewer take
 /// chance for it.
@@ -716,7 +716,7 @@ impl Chunk {
 
 /// Ray m of a row.
 #[inline]
-fn shoot(
+pub fn shoot(
     world: &World,
     site: &Site,
     (sequence, seed): (&Sequence, u32),

@@ -139,6 +139,11 @@ impl Column {
         self.cumulative.last().is_none_or(|end| *end <= 0.0)
     }
 
+    /// Whether each of its shadow rays from a point is the same: it is one light without area.
+    pub fn is_certain(&self) -> bool {
+        matches!(self.emitters.as_slice(), [Emitter { source: Source::Point(_), .. }])
+    }
+
     /// The points that an element's shadow rays are made from.
     pub fn sequence(&self, seed: u32) -> Sequence {
         Sequence::new(seed, SHADOW ^ hash(self.key))

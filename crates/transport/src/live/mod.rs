@@ -29,6 +29,7 @@
 //! assert!(live.rays_traced() < 3 * first);
 //! ```
 
+mod air;
 mod body;
 mod chunk;
 mod column;

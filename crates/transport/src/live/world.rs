@@ -235,6 +235,15 @@ impl World {
         common || self.apart.iter().any(|body| self.blocked_by(*body as usize, ray, salt))
     }
 
+    /// Whether one of some objects stops a ray before its end.
+    pub fn blocked_by_any(&self, ray: &Ray, salt: u32, is_one: impl Fn(usize) -> bool) -> bool {
+        let common = self.common.blocked_where(ray, |t, u, v, _| {
+            let body = self.body_of[t as usize] as usize;
+            !self.is_away[body] && is_one(body) && self.stops(t, u, v, salt)
+        });
+        common || self.apart.iter().any(|body| is_one(*body as usize) && self.blocked_by(*body as usize, ray, salt))
+    }
+
     /// Whether an object with a tree of its own stops a ray before its end.
     #[inline]
     pub fn blocked_by(&self, body: usize, ray: &Ray, salt: u32) -> bool {
