@@ -278,8 +278,8 @@ fn threads_change_nothing() {
     assert_eq!(run(1), run(2));
 }
 
-/// An edit before there are rays enough for a quick picture: every layer can be read, and a step is complete only when
-/// the light is that of the edit.
+/// An edit before there are rays enough for a quick picture: a layer waits or can be read, and a step is complete only
+/// when the light is that of the edit.
 #[test]
 fn an_early_edit_leaves_whole_rows() {
     let mut session = Session::new(cornell_box(), &small()).unwrap();
@@ -291,7 +291,9 @@ fn an_early_edit_leaves_whole_rows() {
     for _ in 0..100_000 {
         let step = session.step(Duration::ZERO);
         for layer in [Layer::Direct, Layer::Indirect, Layer::Bounce(1), Layer::Light(LightId(0))] {
-            assert!(!session.light(ObjectId(0), layer).is_empty());
+            let is_told = session.has_layer(layer);
+            assert_eq!(session.light(ObjectId(0), layer).len(), if is_told { before.len() } else { 0 });
+            assert!(is_told || !step.is_complete);
         }
         if step.is_complete {
             break;
@@ -536,6 +538,60 @@ fn layers_add_up() {
     let parts: f32 = probe.objects.iter().map(|(_, light)| light[1]).sum::<f32>() + probe.direct[1];
     assert!(parts <= 1.01 * probe.irradiance[1] && parts > 0.9 * probe.irradiance[1], "{probe:?}");
     assert_eq!(session.rays(ObjectId(0), 3).len(), 128);
+}
+
+/// A lamp is made brighter while rays are few: layers that are asked for in between, for the first time, are those of the light that
+/// is shown, or wait. They had the lamps of now with the whole light of before.
+#[test]
+fn layers_are_of_one_state_while_light_follows() {
+    let mut session = Session::new(cornell_box(), &small()).unwrap();
+    while session.status().rays < 8 {
+        session.step(Duration::ZERO);
+    }
+    let (floor, lamp) = (ObjectId(0), LightId(0));
+    session.apply(&Edit::Light { light: lamp, dimming: 8.0, colour: [1.0; 3] }).unwrap();
+    let (mut waited, mut told) = (0, 0);
+    for piece in 0..100_000 {
+        if piece % 3 == 0 {
+            let [all, direct] = [Layer::Total, Layer::Direct].map(|layer| session.light(floor, layer));
+            let is_told = session.has_layer(Layer::Direct);
+            assert!(session.has_layer(Layer::Total) && !all.is_empty() && direct.is_empty() != is_told);
+            *(if is_told { &mut told } else { &mut waited }) += 1;
+            for (direct, all) in direct.iter().zip(&all) {
+                assert!(direct[1] <= 1.0001 * all[1], "piece {piece}: {} lx of {} lx are direct", direct[1], all[1]);
+            }
+            // What is told of a place is not more than what falls on it either.
+            let probe = session.probe(floor, 0, [0.3, 0.3]).unwrap();
+            let brought: f32 = probe.lights.iter().map(|(_, light)| luminance(*light)).sum();
+            assert!(brought <= 1.001 * probe.lux, "piece {piece}: {brought} lx of {} lx", probe.lux);
+        }
+        if session.step(Duration::ZERO).is_done {
+            break;
+        }
+    }
+    assert!(waited > 0 && told > 3, "{waited} {told}");
+    // The whole light is that of before, whenever it is asked for.
+    let early = |pieces: Option<u32>| {
+        let mut session = Session::new(cornell_box(), &small()).unwrap();
+        while session.status().rays < 8 {
+            session.step(Duration::ZERO);
+        }
+        if let Some(pieces) = pieces {
+            session.apply(&Edit::Light { light: lamp, dimming: 8.0, colour: [1.0; 3] }).unwrap();
+            (0..pieces).for_each(|_| drop(session.step(Duration::ZERO)));
+            assert!(!session.has_layer(Layer::Direct), "the edit is not seen after {pieces} pieces");
+        }
+        session.light(floor, Layer::Total)
+    };
+    let whole = early(None);
+    (0..3).for_each(|pieces| assert!(early(Some(pieces)) == whole, "after {pieces} pieces"));
+    // Where columns stay, shares are those of before until the edit is seen.
+    let before = session.probe(floor, 0, [0.3, 0.3]).unwrap();
+    session.apply(&Edit::Light { light: lamp, dimming: 1.0, colour: [1.0; 3] }).unwrap();
+    assert_eq!(session.probe(floor, 0, [0.3, 0.3]).unwrap().lights, before.lights);
+    finish(&mut session);
+    let after = session.probe(floor, 0, [0.3, 0.3]).unwrap();
+    assert!((luminance(after.lights[0].1) / luminance(before.lights[0].1) - 0.125).abs() < 1e-5);
 }
 
 /// A furnace: in a closed box of reflectance ρ whose walls all shine alike, H = E/(1 − ρ) everywhere.

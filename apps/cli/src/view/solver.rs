@@ -330,6 +330,9 @@ impl Solver {
             if is_resting && !is_new && !self.is_done && layer != Layer::Total {
                 continue;
             }
+            if !self.session.has_layer(layer) {
+                continue;
+            }
             let started = Instant::now();
             for id in std::mem::take(&mut shown.owed) {
                 if self.model.objects.get(id.0 as usize).is_some_and(|object| !object.deleted) {

@@ -139,11 +139,11 @@ impl Session {
 
     /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, or for
     /// [`Layer::Error`] its standard error. What rays found of it is averaged over neighbours that differ by no more than noise.
-    /// Empty for an object that there is not. Lights beyond the 31st share one column, and [`Layer::Light`] shows what all of
+    /// Empty for an object that there is not, and for a layer that cannot be told yet ([`Session::has_layer`]). Lights beyond the 31st share one column, and [`Layer::Light`] shows what all of
     /// them bring.
     pub fn light(&self, object: ObjectId, layer: Layer) -> Vec<Bands> {
         let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
-        let kept = self.layer(layer);
+        let Some(kept) = self.layer(layer) else { return Vec::new() };
         let first = body.first as usize;
         let of = |list: &[Lanes<4>], element: u32| -> Bands {
             list.get(first + element as usize).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]])
@@ -193,8 +193,19 @@ impl Session {
         (element < chunks[place].len).then_some((&chunks[place], element))
     }
 
-    /// A layer by id. The last ones are kept, as they are asked for object by object.
-    fn layer(&self, layer: Layer) -> Kept {
+    /// Whether [`Session::light`] can tell a layer. While an edit is not seen, lamps, paint and rays are those of a scene whose light
+    /// is not there yet: the whole light is that of the scene before, and so is what was asked for before; other layers wait.
+    pub fn has_layer(&self, layer: Layer) -> bool {
+        let cache = self.cache.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let is_kept = |kept: &Kept| (kept.layer, kept.revision) == (layer, self.state.revision);
+        layer == Layer::Total || !self.state.is_edited || cache.iter().any(is_kept)
+    }
+
+    /// A layer by id, if it can be told. The last ones are kept, as they are asked for object by object.
+    fn layer(&self, layer: Layer) -> Option<Kept> {
+        if !self.has_layer(layer) {
+            return None;
+        }
         let mut cache = self.cache.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let revision = self.state.revision;
         cache.retain(|kept| kept.revision == revision);
@@ -211,7 +222,7 @@ impl Session {
             cache.remove(0);
         }
         cache.push(kept.clone());
-        kept
+        Some(kept)
     }
 
     /// The part of a layer that lamps bring directly, by id.
@@ -364,12 +375,12 @@ impl Session {
         let mut objects: Vec<(u32, Bands)> = objects.into_iter().map(|(body, light)| (body as u32, light)).collect();
         brightest(&mut objects);
         let mut lights: Vec<(u32, Bands)> = Vec::new();
-        for strand in &self.strands {
-            let factor = self.factor(strand);
-            let column = self.state.columns.get(strand.lights.first().map_or(0, |light| self.lights[*light].strand));
-            let own = match (column.and_then(|column| column.get(id)), strand.column) {
+        // Lamps that are not seen yet bring nothing to what is shown.
+        for ((strand, factor), number) in self.strands.iter().zip(&self.state.factors).zip(0..) {
+            let column = self.state.columns.get(number).and_then(|column| column.get(id));
+            let own = match (column, strand.column) {
                 (Some(own), _) if self.state.has_columns => *own,
-                (_, Some(column)) => chunk.light(column, element),
+                (_, Some(column)) if !self.state.is_edited => chunk.light(column, element),
                 _ => continue,
             };
             if let Some(light) = strand.lights.first() {

@@ -189,6 +189,11 @@ impl<const W: usize> Solve<W> {
         false
     }
 
+    /// The direct light that it is solved for.
+    pub fn direct(&self) -> &[Lanes<W>] {
+        &self.d
+    }
+
     /// What surfaces give off at the last sweep.
     pub fn radiosity(&self) -> &[Lanes<W>] {
         &self.y

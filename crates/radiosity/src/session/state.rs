@@ -67,6 +67,8 @@ pub struct State {
     pub direct: Vec<Lanes<4>>,
     /// What surfaces give off by it, but for what lamps carry directly.
     pub given: Vec<Lanes<4>>,
+    /// By what the column of each strand is multiplied in it.
+    pub factors: Vec<Bands>,
     /// Rays of the rows that it is of; none while dark.
     pub solved_rays: u32,
     /// Relative standard error.
@@ -270,7 +272,6 @@ impl Session {
             Some(total) => total,
             None => {
                 let (e, d) = (self.emission(), self.direct_light());
-                self.state.direct.clone_from(&d);
                 let mut start = None;
                 if self.state.solved_rays > 0 {
                     // What is shown, with the lamps and the paint as they are now.
@@ -286,6 +287,7 @@ impl Session {
             self.state.solved_rays = rays;
             self.state.residual = total.residual;
             self.state.given = total.radiosity().to_vec();
+            self.state.direct = total.direct().to_vec();
             let mut h = std::mem::take(&mut total.h);
             self.mask_absent(&mut h);
             self.state.rest = None;
@@ -475,6 +477,7 @@ impl Session {
 
     /// Shows irradiance by id, and notes whose light has changed.
     fn show(&mut self, h: Vec<Lanes<4>>) {
+        let factors = self.strands.iter().map(|strand| self.factor(strand)).collect();
         let state = &mut self.state;
         for (index, body) in self.live.world().bodies.iter().enumerate() {
             let range = body.first as usize..body.dark() as usize;
@@ -483,6 +486,7 @@ impl Session {
             }
         }
         state.shown = h;
+        state.factors = factors;
         state.revision += 1;
     }
 
