@@ -4,12 +4,11 @@
 mod room;
 
 use radiosity::session::{
-    Applied, Edit, EditError, Layer, LightId, LightKind, MOST_EDITS, NewLight, NewLightKind, ObjectId, Session,
-    SessionOptions,
+    Applied, Edit, EditError, Layer, LightId, LightKind, MOST_EDITS, NewLight, ObjectId, Session, SessionOptions,
 };
 use radiosity::{
-    Bands, Material, Mesh, PointLight, Scene, Side, Solution, SolveOptions, Surface, Texture, TextureRef, Tracer,
-    cornell_box, luminance,
+    Bands, Material, Mesh, PointLight, PointLightKind, Scene, Side, Solution, SolveOptions, Surface, Texture,
+    TextureRef, Tracer, cornell_box, luminance,
 };
 use radiosity_trace::sampling::Random;
 use room::{Furnishing, room};
@@ -70,11 +69,11 @@ impl Dice {
         (glam::DMat4::from_translation(shift) * turn).to_cols_array()
     }
 
-    fn kind(&mut self) -> NewLightKind {
+    fn kind(&mut self) -> PointLightKind {
         match self.below(3) {
-            0 => NewLightKind::Point,
-            1 => NewLightKind::Spot { inner: self.between(0.0, 0.5), outer: 0.7 },
-            _ => NewLightKind::Directional,
+            0 => PointLightKind::Point,
+            1 => PointLightKind::Spot { inner: self.between(0.0, 0.5), outer: 0.7 },
+            _ => PointLightKind::Directional,
         }
     }
 
@@ -167,11 +166,11 @@ fn catalogue_77_random_edits_of_a_furnished_room() {
 }
 
 /// The scene of a lamp of a kind, straight from a file: what [`Edit::ChangeLight`] is to lead to.
-fn with_lamps(kinds: &[(NewLightKind, Bands)]) -> Scene {
+fn with_lamps(kinds: &[(PointLightKind, Bands)]) -> Scene {
     let mut scene = cornell_box();
     scene.lights.extend(kinds.iter().enumerate().map(|(k, (kind, intensity))| PointLight {
         name: format!("lamp {k}"),
-        kind: (*kind).into(),
+        kind: *kind,
         position: glam::DVec3::new(0.15 + 0.1 * k as f64, 0.4, 0.2),
         direction: glam::DVec3::new(0.3, -1.0, -0.2).normalize(),
         intensity: *intensity,
@@ -184,25 +183,25 @@ fn with_lamps(kinds: &[(NewLightKind, Bands)]) -> Scene {
 /// opens the edited scene, and it is taken back to the last bit.
 #[test]
 fn catalogue_77_a_changed_lamp_is_one_that_was_always_so() {
-    let spot = NewLightKind::Spot { inner: 0.2, outer: 0.6 };
-    let narrow = NewLightKind::Spot { inner: 0.0, outer: 0.25 };
+    let spot = PointLightKind::Spot { inner: 0.2, outer: 0.6 };
+    let narrow = PointLightKind::Spot { inner: 0.0, outer: 0.25 };
     let from = [
-        (NewLightKind::Point, [5.0, 4.0, 3.0]),
+        (PointLightKind::Point, [5.0, 4.0, 3.0]),
         (spot, [9.0; 3]),
-        (NewLightKind::Directional, [40.0, 40.0, 60.0]),
+        (PointLightKind::Directional, [40.0, 40.0, 60.0]),
         (spot, [2.0, 3.0, 4.0]),
     ];
     let to = [
         (spot, [9.0, 0.0, 3.0]),
-        (NewLightKind::Directional, [70.0, 60.0, 50.0]),
-        (NewLightKind::Point, [3.0; 3]),
+        (PointLightKind::Directional, [70.0, 60.0, 50.0]),
+        (PointLightKind::Point, [3.0; 3]),
         (narrow, [6.0, 3.0, 4.0]),
     ];
     let mut session = Session::new(with_lamps(&from), &small()).unwrap();
     finish(&mut session);
     let before = bits(&session);
     // The Cornell box's own lamp is light 0.
-    let change = |k: usize, (kind, intensity): (NewLightKind, Bands)| Edit::ChangeLight {
+    let change = |k: usize, (kind, intensity): (PointLightKind, Bands)| Edit::ChangeLight {
         light: LightId(k as u32 + 1),
         kind,
         intensity,
@@ -243,16 +242,37 @@ fn catalogue_77_a_changed_lamp_is_one_that_was_always_so() {
     // What no light can be is refused, and what has an area.
     let lamp = |kind, intensity| Edit::ChangeLight { light: LightId(1), kind, intensity };
     for wrong in [
-        lamp(NewLightKind::Point, [-1.0, 0.0, 0.0]),
-        lamp(NewLightKind::Point, [f32::NAN; 3]),
-        lamp(NewLightKind::Point, [1e13; 3]),
-        lamp(NewLightKind::Spot { inner: 0.7, outer: 0.6 }, [1.0; 3]),
-        lamp(NewLightKind::Spot { inner: 0.0, outer: 2.0 }, [1.0; 3]),
-        lamp(NewLightKind::Spot { inner: f64::NAN, outer: 0.5 }, [1.0; 3]),
+        lamp(PointLightKind::Point, [-1.0, 0.0, 0.0]),
+        lamp(PointLightKind::Point, [f32::NAN; 3]),
+        lamp(PointLightKind::Point, [1e13; 3]),
+        lamp(PointLightKind::Spot { inner: 0.7, outer: 0.6 }, [1.0; 3]),
+        lamp(PointLightKind::Spot { inner: 0.0, outer: 2.0 }, [1.0; 3]),
+        lamp(PointLightKind::Spot { inner: f64::NAN, outer: 0.5 }, [1.0; 3]),
     ] {
         assert!(matches!(session.apply(&wrong), Err(EditError::ChangeLight { light: LightId(1), .. })), "{wrong:?}");
     }
-    let of = |light| Edit::ChangeLight { light, kind: NewLightKind::Point, intensity: [1.0; 3] };
+    // Parallel light may be anywhere; a point may not, be it made one there, moved or copied there. What a file has far away stays.
+    let far = glam::DMat4::from_translation(glam::DVec3::new(1e6, 0.0, 0.0)).to_cols_array();
+    let [sun, point] = [LightId(3), LightId(1)];
+    let too_far = |light| EditError::ChangeLight { light, why: "it would be too far from the middle of the scene" };
+    let into = |light, kind| Edit::ChangeLight { light, kind, intensity: [1.0; 3] };
+    let moved = |light| Edit::MoveLight { light, matrix: far };
+    assert_eq!(session.apply(&moved(point)), Err(too_far(point)));
+    let copied = Edit::CopyLight { light: point, matrix: far };
+    assert!(matches!(session.apply(&copied), Err(EditError::NewLight(_))));
+    let both = Edit::Several(vec![moved(sun), into(sun, spot)]);
+    assert_eq!(session.apply(&both), Err(too_far(sun)), "by where it is by then");
+    let there = session.apply(&moved(sun)).unwrap();
+    assert_eq!(session.apply(&into(sun, PointLightKind::Point)), Err(too_far(sun)));
+    session.apply(&there.inverse).unwrap();
+    session.apply(&into(sun, PointLightKind::Point)).unwrap();
+    let mut distant = with_lamps(&from);
+    distant.lights[0].position.x = 100.0;
+    let mut session_of_distant = Session::new(distant, &small()).unwrap();
+    let parallel = session_of_distant.apply(&into(point, PointLightKind::Directional)).unwrap();
+    session_of_distant.apply(&parallel.inverse).unwrap();
+
+    let of = |light| Edit::ChangeLight { light, kind: PointLightKind::Point, intensity: [1.0; 3] };
     assert_eq!(session.apply(&of(LightId(0))), Err(EditError::NotPlaceable(LightId(0))), "an object that shines");
     assert_eq!(session.apply(&of(LightId(9))), Err(EditError::UnknownLight(LightId(9))));
     session.apply(&Edit::DeleteLight { light: LightId(1) }).unwrap();
@@ -371,7 +391,7 @@ fn lights_without_area_come_and_go() {
     let light = |session: &Session, id: LightId| session.model().lights[id.0 as usize].clone();
     let spot = NewLight {
         name: "spot".to_owned(),
-        kind: NewLightKind::Spot { inner: 0.3, outer: 0.6 },
+        kind: PointLightKind::Spot { inner: 0.3, outer: 0.6 },
         position: [0.25, 0.4, 0.25],
         direction: [0.0, -3.0, 0.0],
         intensity: [5.0; 3],
@@ -414,8 +434,8 @@ fn lights_without_area_come_and_go() {
     refused(&|light| light.direction[0] = f64::INFINITY);
     refused(&|light| light.intensity[2] = -1.0);
     refused(&|light| light.intensity[2] = 1e13);
-    refused(&|light| light.kind = NewLightKind::Spot { inner: 0.7, outer: 0.6 });
-    refused(&|light| light.kind = NewLightKind::Spot { inner: 0.0, outer: 2.0 });
+    refused(&|light| light.kind = PointLightKind::Spot { inner: 0.7, outer: 0.6 });
+    refused(&|light| light.kind = PointLightKind::Spot { inner: 0.0, outer: 2.0 });
     refused(&|light| light.name = "x".repeat(201));
     for edit in [
         Edit::DeleteLight { light: LightId(0) },

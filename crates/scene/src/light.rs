@@ -2,9 +2,11 @@
 
 use crate::Bands;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// The kinds of lights without area.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PointLightKind {
     /// Shines equally in all directions; intensity in candela.
     Point,

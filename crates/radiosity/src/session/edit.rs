@@ -27,7 +27,7 @@ pub struct NewLight {
     #[serde(default)]
     pub name: String,
     /// Its kind.
-    pub kind: NewLightKind,
+    pub kind: PointLightKind,
     /// Where it is, world coordinates, metres; of no account for parallel light.
     #[serde(default)]
     pub position: [f64; 3],
@@ -36,43 +36,6 @@ pub struct NewLight {
     pub direction: [f64; 3],
     /// Candela per band, or lux per band of parallel light.
     pub intensity: Bands,
-}
-
-/// Kinds of lights without area.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NewLightKind {
-    /// Shines in all directions.
-    Point,
-    /// Shines in a cone.
-    Spot {
-        /// Half angle inside which it is as bright as it gets, radians.
-        inner: f64,
-        /// Half angle outside which there is no light, radians; at most π/2.
-        outer: f64,
-    },
-    /// Parallel light.
-    Directional,
-}
-
-impl From<NewLightKind> for PointLightKind {
-    fn from(kind: NewLightKind) -> Self {
-        match kind {
-            NewLightKind::Point => PointLightKind::Point,
-            NewLightKind::Spot { inner, outer } => PointLightKind::Spot { inner, outer },
-            NewLightKind::Directional => PointLightKind::Directional,
-        }
-    }
-}
-
-impl From<PointLightKind> for NewLightKind {
-    fn from(kind: PointLightKind) -> Self {
-        match kind {
-            PointLightKind::Point => NewLightKind::Point,
-            PointLightKind::Spot { inner, outer } => NewLightKind::Spot { inner, outer },
-            PointLightKind::Directional => NewLightKind::Directional,
-        }
-    }
 }
 
 /// A change of the scene. Matrices are by columns and carry the object as the file places it, in world coordinates, to
@@ -120,7 +83,7 @@ pub enum Edit {
         /// The light: point, spot or directional.
         light: LightId,
         /// Its kind from now on.
-        kind: NewLightKind,
+        kind: PointLightKind,
         /// Candela per band, or lux per band of parallel light, before it is dimmed and coloured.
         intensity: Bands,
     },

@@ -1,15 +1,13 @@
 //! Edits are checked as a whole, then carried out; and the scene as they leave it.
 
-use super::edit::{
-    Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight, NewLightKind,
-};
-use super::light::{Light, kind_of};
+use super::edit::{Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
+use super::light::{Light, distance, kind_of};
 use super::paint::brighter;
 use super::{LightId, MOST_COLUMNS, ObjectId, Session, bytes};
 use glam::{DAffine3, DMat4, DVec3};
 use radiosity_scene::material::MAX_REFLECTANCE;
-use radiosity_scene::{Bands, PointLight, Scene, Sky, Source};
-use radiosity_transport::live::REACH;
+use radiosity_scene::{Bands, PointLight, PointLightKind, Scene, Sky, Source};
+use radiosity_transport::live::{REACH, World};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How much larger or smaller than in the file an object may be made, as a factor of its volume.
@@ -42,9 +40,35 @@ struct Known {
 
 #[derive(Clone, Copy)]
 struct KnownLight {
-    has_area: bool,
     is_gone: bool,
+    /// None with area.
+    lamp: Option<KnownLamp>,
 }
+
+/// A light without area, as far as it matters where it is.
+#[derive(Clone, Copy)]
+struct KnownLamp {
+    is_parallel: bool,
+    position: DVec3,
+    matrix: [f64; 16],
+    reach: f64,
+}
+
+impl KnownLamp {
+    fn of(point: &PointLight, matrix: [f64; 16], reach: f64) -> KnownLamp {
+        KnownLamp { is_parallel: point.kind == PointLightKind::Directional, position: point.position, matrix, reach }
+    }
+
+    /// Whether it is where shadow rays find it in single precision; parallel light has no place.
+    fn is_near(&self, world: &World) -> bool {
+        let placed = affine(&self.matrix).transform_point3(self.position);
+        // Written so that what is no number is refused, too.
+        self.is_parallel || distance(world, placed) <= self.reach
+    }
+}
+
+/// What is wrong with a light elsewhere.
+const TOO_FAR: &str = "it would be too far from the middle of the scene";
 
 /// Letters of the name of a light that is added.
 const LONGEST_NAME: usize = 200;
@@ -59,7 +83,10 @@ impl Session {
             lights: self
                 .lights
                 .iter()
-                .map(|light| KnownLight { has_area: light.point.is_none(), is_gone: light.is_gone })
+                .map(|light| KnownLight {
+                    is_gone: light.is_gone,
+                    lamp: light.point.as_ref().map(|point| KnownLamp::of(point, light.matrix, light.reach)),
+                })
                 .collect(),
             elements: self.live.ids(),
         };
@@ -76,15 +103,20 @@ impl Session {
             Some(false) => Err(EditError::Deleted(object)),
             Some(true) => Ok(known.source[object.0 as usize]),
         };
-        // Of lights without area, whether it is gone.
+        // A light without area, and whether it is gone.
         let placeable = |light: LightId, known: &Known| match known.lights.get(light.0 as usize) {
             None => Err(EditError::UnknownLight(light)),
-            Some(KnownLight { has_area: true, .. }) => Err(EditError::NotPlaceable(light)),
-            Some(own) => Ok(own.is_gone),
+            Some(KnownLight { is_gone, lamp }) => {
+                lamp.map(|lamp| (lamp, *is_gone)).ok_or(EditError::NotPlaceable(light))
+            }
         };
         let lit = |light: LightId, known: &Known| match placeable(light, known)? {
-            true => Err(EditError::DeletedLight(light)),
-            false => Ok(()),
+            (_, true) => Err(EditError::DeletedLight(light)),
+            (lamp, false) => Ok(lamp),
+        };
+        let world = self.live.world();
+        let near = |light: LightId, lamp: KnownLamp| {
+            if lamp.is_near(world) { Ok(lamp) } else { Err(EditError::ChangeLight { light, why: TOO_FAR }) }
         };
         match edit {
             Edit::Light { light, dimming, colour } => {
@@ -106,28 +138,35 @@ impl Session {
                 self.check_place(*object, source, matrix)?;
             }
             Edit::MoveLight { light, matrix } => {
-                lit(*light, known)?;
+                let lamp = lit(*light, known)?;
                 check_matrix(matrix)?;
+                known.lights[light.0 as usize].lamp = Some(near(*light, KnownLamp { matrix: *matrix, ..lamp })?);
             }
             Edit::ChangeLight { light, kind, intensity } => {
-                lit(*light, known)?;
+                let lamp = lit(*light, known)?;
                 check_lamp(*kind, intensity).map_err(|why| EditError::ChangeLight { light: *light, why })?;
+                let is_parallel = *kind == PointLightKind::Directional;
+                known.lights[light.0 as usize].lamp = Some(near(*light, KnownLamp { is_parallel, ..lamp })?);
             }
             Edit::AddLight { light } => {
-                self.check_light(light)?;
-                self.check_more(known, 0, Some(KnownLight { has_area: false, is_gone: false }))?;
+                let lamp = self.check_light(light)?;
+                self.check_more(known, 0, Some(KnownLight { is_gone: false, lamp: Some(lamp) }))?;
             }
             Edit::CopyLight { light, matrix } => {
-                lit(*light, known)?;
+                let lamp = lit(*light, known)?;
                 check_matrix(matrix)?;
-                self.check_more(known, 0, Some(KnownLight { has_area: false, is_gone: false }))?;
+                let lamp = KnownLamp { matrix: *matrix, ..lamp };
+                if !lamp.is_near(world) {
+                    return Err(EditError::NewLight(TOO_FAR));
+                }
+                self.check_more(known, 0, Some(KnownLight { is_gone: false, lamp: Some(lamp) }))?;
             }
             Edit::DeleteLight { light } => {
                 lit(*light, known)?;
                 known.lights[light.0 as usize].is_gone = true;
             }
             Edit::RestoreLight { light } => {
-                if !placeable(*light, known)? {
+                if !placeable(*light, known)?.1 {
                     return Err(EditError::LightNotDeleted(*light));
                 }
                 known.lights[light.0 as usize].is_gone = false;
@@ -136,7 +175,7 @@ impl Session {
                 let source = there(*object, known)?;
                 self.check_place(*object, source, matrix)?;
                 let body = &self.live.world().bodies[source];
-                let light = self.objects[source].light.map(|_| KnownLight { has_area: true, is_gone: false });
+                let light = self.objects[source].light.map(|_| KnownLight { is_gone: false, lamp: None });
                 known.present.push(true);
                 known.source.push(source);
                 self.check_more(known, body.elements() as usize + 1, light)?;
@@ -174,8 +213,8 @@ impl Session {
         if needed > allowed { Err(EditError::Memory { needed, allowed }) } else { Ok(()) }
     }
 
-    /// Whether a light is one.
-    fn check_light(&self, light: &NewLight) -> Result<(), EditError> {
+    /// Whether a light is one; what it would be.
+    fn check_light(&self, light: &NewLight) -> Result<KnownLamp, EditError> {
         let world = self.live.world();
         let refuse = |why| Err(EditError::NewLight(why));
         if light.name.chars().count() > LONGEST_NAME {
@@ -184,11 +223,16 @@ impl Session {
         if light.position.iter().chain(&light.direction).any(|x| !x.is_finite()) {
             return refuse("its position or direction has a number that is not finite");
         }
-        let distance = (DVec3::from(light.position) - world.middle).abs().max_element();
-        if light.kind != NewLightKind::Directional && distance > REACH * world.half {
-            return refuse("it would be too far from the middle of the scene");
+        let lamp = KnownLamp {
+            is_parallel: light.kind == PointLightKind::Directional,
+            position: light.position.into(),
+            matrix: DMat4::IDENTITY.to_cols_array(),
+            reach: REACH * world.half,
+        };
+        if !lamp.is_near(world) {
+            return refuse(TOO_FAR);
         }
-        check_lamp(light.kind, &light.intensity).or_else(refuse)
+        check_lamp(light.kind, &light.intensity).map_or_else(refuse, |()| Ok(lamp))
     }
 
     fn check_place(&self, object: ObjectId, source: usize, matrix: &[f64; 16]) -> Result<(), EditError> {
@@ -241,8 +285,8 @@ impl Session {
             Edit::ChangeLight { light, kind, intensity } => {
                 let own = &mut self.lights[light.0 as usize];
                 let point = own.point.as_mut().expect("lights without area alone are changed: that was checked");
-                let inverse = Edit::ChangeLight { light: *light, kind: point.kind.into(), intensity: point.intensity };
-                (point.kind, point.intensity) = ((*kind).into(), *intensity);
+                let inverse = Edit::ChangeLight { light: *light, kind: point.kind, intensity: point.intensity };
+                (point.kind, point.intensity) = (*kind, *intensity);
                 own.kind = kind_of(point);
                 done.strands.insert(own.strand);
                 done.traces = true;
@@ -252,13 +296,14 @@ impl Session {
                 let down = -self.scene.up.direction();
                 let point = PointLight {
                     name: light.name.clone(),
-                    kind: light.kind.into(),
+                    kind: light.kind,
                     position: light.position.into(),
                     direction: DVec3::from(light.direction).try_normalize().unwrap_or(down),
                     intensity: light.intensity,
                     range: None,
                 };
-                self.put_light(Light::without_area(point), done)
+                let light = Light::without_area(point, self.live.world());
+                self.put_light(light, done)
             }
             Edit::CopyLight { light, matrix } => {
                 let copy = Light { matrix: *matrix, ..self.lights[light.0 as usize].clone() };
@@ -467,12 +512,12 @@ fn count(edit: &Edit) -> usize {
 }
 
 /// Whether a light without area may be so; else why not.
-fn check_lamp(kind: NewLightKind, intensity: &Bands) -> Result<(), &'static str> {
+fn check_lamp(kind: PointLightKind, intensity: &Bands) -> Result<(), &'static str> {
     if intensity.iter().any(|x| !(0.0..=MOST_INTENSITY).contains(x)) {
         return Err("its intensity is negative, above 1e12 or no number");
     }
     match kind {
-        NewLightKind::Spot { inner, outer } if !(inner >= 0.0 && inner <= outer && outer <= MOST_CONE) => {
+        PointLightKind::Spot { inner, outer } if !(inner >= 0.0 && inner <= outer && outer <= MOST_CONE) => {
             Err("the half angles of a spot are 0 or more, the outer one no less than the inner and at most π/2")
         }
         _ => Ok(()),

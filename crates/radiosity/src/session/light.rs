@@ -1,8 +1,9 @@
 //! The lights of a session, and the columns that their light is solved in.
 
 use super::model::LightKind;
+use glam::DVec3;
 use radiosity_scene::{Bands, PointLight, PointLightKind, Scene, luminance};
-use radiosity_transport::live::{Lamp, Live};
+use radiosity_transport::live::{Lamp, Live, REACH, World};
 use radiosity_transport::luminaires::BRIGHT;
 
 /// Lights with a column of their own; those beyond share the last one. A column takes 32 bytes per element, and five of them
@@ -20,6 +21,8 @@ pub struct Light {
     pub matrix: [f64; 16],
     /// As the file has it; none for objects and the sky.
     pub point: Option<PointLight>,
+    /// Farthest from the middle of the scene that it may be as a point or a spot, metres: as all lights, or as the file has it.
+    pub reach: f64,
     /// The object that it is.
     pub body: Option<usize>,
     /// Whether shadow rays go to it; other lights are found by rows.
@@ -40,6 +43,7 @@ impl Light {
             colour: [1.0; 3],
             matrix: glam::DMat4::IDENTITY.to_cols_array(),
             point: None,
+            reach: 0.0,
             body: None,
             is_direct: true,
             strand: 0,
@@ -48,9 +52,11 @@ impl Light {
     }
 
     /// A light without area.
-    pub fn without_area(point: PointLight) -> Light {
+    pub fn without_area(point: PointLight, world: &World) -> Light {
         let light = Light::new(kind_of(&point), &point.name);
-        Light { point: Some(point), ..light }
+        // Parallel light has no place that could be taken for one.
+        let own = if point.kind == PointLightKind::Directional { 0.0 } else { distance(world, point.position) };
+        Light { reach: own.max(REACH * world.half), point: Some(point), ..light }
     }
 
     /// By what its light is multiplied.
@@ -67,6 +73,11 @@ impl Light {
         light.direction = turned.try_normalize().unwrap_or(light.direction);
         Some(light)
     }
+}
+
+/// How far a place is from the middle of the scene, as far as reach goes.
+pub fn distance(world: &World, position: DVec3) -> f64 {
+    (position - world.middle).abs().max_element()
 }
 
 /// What a light without area is to people.
@@ -116,7 +127,7 @@ pub fn lights_of(scene: &Scene, live: &Live) -> Vec<Light> {
             lights.push(Light { body: Some(body), is_direct, ..Light::new(LightKind::Object, &object.name) });
         }
     }
-    lights.extend(scene.lights.iter().cloned().map(Light::without_area));
+    lights.extend(scene.lights.iter().map(|point| Light::without_area(point.clone(), live.world())));
     if !scene.sky.is_black() {
         lights.push(Light { is_direct: false, ..Light::new(LightKind::Sky, "sky") });
     }
