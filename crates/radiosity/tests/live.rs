@@ -383,6 +383,26 @@ fn the_first_picture_is_near_the_last() {
 }
 
 /// Lights without area come and go like objects; one that is gone gives nothing and traces nothing.
+/// A point of a file becomes a spot that shines down, unless its node is turned; so does parallel light. A spot shines as it is turned.
+#[test]
+fn a_point_made_a_spot_shines_down() {
+    let spot = PointLightKind::Spot { inner: 0.2, outer: 0.6 };
+    let mut scene =
+        with_lamps(&[(PointLightKind::Point, [5.0; 3]), (PointLightKind::Point, [5.0; 3]), (spot, [5.0; 3])]);
+    scene.lights[0].direction = glam::DVec3::NEG_Z;
+    scene.lights[2].direction = glam::DVec3::NEG_Z;
+    let turned = scene.lights[1].direction;
+    let mut session = Session::new(scene, &small()).unwrap();
+    for kind in [spot, PointLightKind::Directional] {
+        for (light, direction) in [(1, glam::DVec3::NEG_Y), (2, turned), (3, glam::DVec3::NEG_Z)] {
+            let light = LightId(light);
+            session.apply(&Edit::ChangeLight { light, kind, intensity: [5.0; 3] }).unwrap();
+            let own = session.model().lights[light.0 as usize].direction.unwrap();
+            assert_eq!(own, direction.to_array(), "{light:?} as {kind:?}");
+        }
+    }
+}
+
 #[test]
 fn lights_without_area_come_and_go() {
     let mut session = Session::new(cornell_box(), &small()).unwrap();

@@ -118,6 +118,16 @@ pub fn is_direct(live: &Live, body: usize) -> bool {
     shape.is_varied || shape.is_see_through || f64::from(peak) > BRIGHT * power / area.max(f64::MIN_POSITIVE)
 }
 
+/// A point light as it hangs from a ceiling: nobody turns what shines in all directions, and glTF has −Z for what is not turned.
+/// Made a spot or parallel light it shines down, unless its node was turned.
+fn hung(point: &PointLight, scene: &Scene) -> PointLight {
+    let is_unturned = point.kind == PointLightKind::Point && point.direction.abs_diff_eq(DVec3::NEG_Z, UNTURNED);
+    PointLight { direction: if is_unturned { -scene.up.direction() } else { point.direction }, ..point.clone() }
+}
+
+/// Rounding of a direction in files.
+const UNTURNED: f64 = 1e-6;
+
 /// The lights of a scene: objects that shine, lights without area, the sky.
 pub fn lights_of(scene: &Scene, live: &Live) -> Vec<Light> {
     let mut lights = Vec::new();
@@ -127,7 +137,7 @@ pub fn lights_of(scene: &Scene, live: &Live) -> Vec<Light> {
             lights.push(Light { body: Some(body), is_direct, ..Light::new(LightKind::Object, &object.name) });
         }
     }
-    lights.extend(scene.lights.iter().map(|point| Light::without_area(point.clone(), live.world())));
+    lights.extend(scene.lights.iter().map(|point| Light::without_area(hung(point, scene), live.world())));
     if !scene.sky.is_black() {
         lights.push(Light { is_direct: false, ..Light::new(LightKind::Sky, "sky") });
     }
