@@ -45,6 +45,15 @@ pub struct Light {
     pub rest: Bands,
 }
 
+/// How much the vertices of an object have of each other in averages over neighbours: the same for all layers of one state.
+#[derive(Clone, Debug, Default)]
+pub struct Weights {
+    /// Of each spot itself: its area that is not buried.
+    own: Vec<f32>,
+    /// Of those beside it, as they are listed.
+    beside: Vec<f32>,
+}
+
 /// The drawn mesh of a shape. In the coordinates of the file's world.
 #[derive(Clone, Debug, Default)]
 pub struct Display {
@@ -126,35 +135,22 @@ impl Display {
         self.beside = pairs.into_iter().map(|pair| pair[1]).collect();
     }
 
-    /// Light at the vertices, from that of the elements; what is buried does not count. What is averaged with what follows from
-    /// `guide`, the luminance of what rays found of all light, and what is taken for its relative standard error by element.
+    /// Light at the vertices, from that of the elements; what is buried does not count. What rays found is averaged by the weights,
+    /// if there are any.
     pub fn light(
         &self,
         light: impl Fn(u32) -> Light,
-        (guide, noise): (impl Fn(u32) -> f32, f32),
+        weights: Option<&Weights>,
         is_buried: impl Fn(u32) -> bool,
     ) -> Vec<Bands> {
-        // Of elements that are not buried: the light of lamps, the rest, and the guide.
-        let element = |element: u32| {
+        let of = |element| {
             let Light { lamps: [a, b, c], rest: [d, e, f] } = light(element);
-            (!is_buried(element)).then(|| [a, b, c, d, e, f, guide(element)])
+            [a, b, c, d, e, f]
         };
-        let elements: Vec<Option<[f32; 7]>> = (0..self.indices.len() as u32 / 3).map(element).collect();
-        // Their means around each spot, and their area there.
-        let spot = |(ends, area): (&[u32], &f32)| {
-            let (mut sum, mut whole) = ([0f32; 7], 0f32);
-            for (element, weight) in &self.around[ends[0] as usize..ends[1] as usize] {
-                if let Some(own) = &elements[*element as usize] {
-                    whole += weight;
-                    (0..7).for_each(|k| sum[k] += weight * own[k]);
-                }
-            }
-            (sum.map(|s| if whole > 0.0 { s / whole } else { 0.0 }), whole * area)
-        };
-        let spots: Vec<([f32; 7], f32)> = self.starts.windows(2).zip(&self.areas).map(spot).collect();
-        let mut rest: Vec<Bands> = spots.iter().map(|([_, _, _, a, b, c, _], _)| [*a, *b, *c]).collect();
-        if noise > 0.0 {
-            self.average(&mut rest, &spots, noise);
+        let spots = self.at_spots(of, is_buried);
+        let mut rest: Vec<Bands> = spots.iter().map(|([_, _, _, a, b, c], _)| [*a, *b, *c]).collect();
+        if let Some(weights) = weights {
+            self.average(&mut rest, weights);
         }
         let whole = |spot: &u32| {
             let (lamps, rest) = (spots[*spot as usize].0, rest[*spot as usize]);
@@ -163,14 +159,58 @@ impl Display {
         self.spot.iter().map(whole).collect()
     }
 
+    /// Means of the elements around each spot, as far as they are not buried, and their area there.
+    fn at_spots<const N: usize>(
+        &self,
+        of: impl Fn(u32) -> [f32; N],
+        is_buried: impl Fn(u32) -> bool,
+    ) -> Vec<([f32; N], f32)> {
+        let element = |element: u32| (!is_buried(element)).then(|| of(element));
+        let elements: Vec<Option<[f32; N]>> = (0..self.indices.len() as u32 / 3).map(element).collect();
+        let spot = |(ends, area): (&[u32], &f32)| {
+            let (mut sum, mut whole) = ([0f32; N], 0f32);
+            for (element, weight) in &self.around[ends[0] as usize..ends[1] as usize] {
+                if let Some(own) = &elements[*element as usize] {
+                    whole += weight;
+                    (0..N).for_each(|k| sum[k] += weight * own[k]);
+                }
+            }
+            (sum.map(|s| if whole > 0.0 { s / whole } else { 0.0 }), whole * area)
+        };
+        self.starts.windows(2).zip(&self.areas).map(spot).collect()
+    }
+
+    /// The weights of averages, by `guide`, the luminance of what rays found of all light, and the most that is taken for its
+    /// relative standard error by element.
+    pub fn weights(&self, guide: impl Fn(u32) -> f32, noise: f32, is_buried: impl Fn(u32) -> bool) -> Weights {
+        let spots = self.at_spots(|element| [guide(element)], is_buried);
+        let noise = noise.min(self.noise(&spots));
+        // Tukey's biweight of the difference, relative to the mean of both.
+        let weight = |a: usize, b: u32| {
+            let ([a], ([b], area)) = (spots[a].0, spots[b as usize]);
+            let largest = REACH * noise * 0.5 * (a + b);
+            let near = if largest > 0.0 { (1.0 - ((a - b) / largest).powi(2)).max(0.0) } else { 0.0 };
+            area * near * near
+        };
+        let mut beside = Vec::with_capacity(self.beside.len());
+        for spot in 0..spots.len() {
+            beside.extend(self.beside[self.beside(spot)].iter().map(|n| weight(spot, *n)));
+        }
+        Weights { own: spots.into_iter().map(|(_, area)| area).collect(), beside }
+    }
+
+    /// Where the spots beside one are listed.
+    fn beside(&self, spot: usize) -> std::ops::Range<usize> {
+        self.beside_starts[spot] as usize..self.beside_starts[spot + 1] as usize
+    }
+
     /// The relative standard error of elements, as vertices tell by how far they are from the mean of their neighbours: light that
     /// rises or falls evenly does not count, and the median is that of the many places where it does.
-    fn noise(&self, spots: &[([f32; 7], f32)]) -> f32 {
-        let guide = |spot: u32| spots[spot as usize].0[6];
+    fn noise(&self, spots: &[([f32; 1], f32)]) -> f32 {
+        let guide = |spot: u32| spots[spot as usize].0[0];
         let mut apart: Vec<f32> = Vec::new();
         for spot in 0..spots.len() as u32 {
-            let ends = [spot, spot + 1].map(|spot| self.beside_starts[spot as usize] as usize);
-            let beside = &self.beside[ends[0]..ends[1]];
+            let beside = &self.beside[self.beside(spot as usize)];
             if beside.len() < AROUND || guide(spot) <= 0.0 {
                 continue;
             }
@@ -184,26 +224,13 @@ impl Display {
         PER_MEDIAN * *apart.select_nth_unstable_by(middle, f32::total_cmp).1
     }
 
-    /// Averages over neighbours that differ by no more than noise, by the guide and the area of each spot.
-    fn average(&self, rest: &mut Vec<Bands>, spots: &[([f32; 7], f32)], noise: f32) {
-        let noise = noise.min(self.noise(spots));
-        // Tukey's biweight of the difference, relative to the mean of both.
-        let weight = |a: usize, b: u32| {
-            let (a, (b, area)) = (spots[a].0[6], &spots[b as usize]);
-            let largest = REACH * noise * 0.5 * (a + b[6]);
-            let near = if largest > 0.0 { (1.0 - ((a - b[6]) / largest).powi(2)).max(0.0) } else { 0.0 };
-            area * near * near
-        };
-        let beside = |spot: usize| self.beside_starts[spot] as usize..self.beside_starts[spot + 1] as usize;
-        let mut weights = Vec::with_capacity(self.beside.len());
-        for spot in 0..spots.len() {
-            weights.extend(self.beside[beside(spot)].iter().map(|n| weight(spot, *n)));
-        }
+    /// Averages over neighbours that differ by no more than noise.
+    fn average(&self, rest: &mut Vec<Bands>, weights: &Weights) {
         for _ in 0..ROUNDS {
             let averaged = |(spot, own): (usize, &Bands)| {
-                let mut whole = spots[spot].1;
+                let mut whole = weights.own[spot];
                 let mut sum = own.map(|x| whole * x);
-                for (n, weight) in self.beside[beside(spot)].iter().zip(&weights[beside(spot)]) {
+                for (n, weight) in self.beside[self.beside(spot)].iter().zip(&weights.beside[self.beside(spot)]) {
                     whole += weight;
                     let other = rest[*n as usize];
                     (0..3).for_each(|band| sum[band] += weight * other[band]);
@@ -294,13 +321,14 @@ mod tests {
         assert!(places.len() > 1000);
         let found = |element: u32| 100.0 * (1.0 + 0.0625 * noise(element));
         let light = |element| Light { lamps: [0.0; 3], rest: [found(element); 3] };
-        let plain = display.light(light, (found, 0.0), |_| false);
-        let filtered = display.light(light, (found, 0.0625), |_| false);
+        let weights = display.weights(found, 0.0625, |_| false);
+        let plain = display.light(light, None, |_| false);
+        let filtered = display.light(light, Some(&weights), |_| false);
         let (before, after) = (spread(&plain, 100.0), spread(&filtered, 100.0));
         assert!(before > 0.02 && after < 0.5 * before, "{before} {after}");
         // What lamps bring is the mean of what is around, whatever the noise of the rest.
         let lamp = |element: u32| Light { lamps: [found(element); 3], rest: [0.0; 3] };
-        assert_eq!(display.light(lamp, (found, 0.0625), |_| false), plain);
+        assert_eq!(display.light(lamp, Some(&weights), |_| false), plain);
     }
 
     #[test]
@@ -309,7 +337,8 @@ mod tests {
         let step = |element: u32| if places[element as usize] < 0.5 { 100.0 } else { 150.0 };
         let total = |element: u32| step(element) * (1.0 + 0.01 * noise(element));
         let rest = |share: f32| move |element| Light { lamps: [0.0; 3], rest: [share * total(element); 3] };
-        let filtered = display.light(rest(1.0), (total, 0.0625), |_| false);
+        let weights = display.weights(total, 0.0625, |_| false);
+        let filtered = display.light(rest(1.0), Some(&weights), |_| false);
         // An element, on a floor that is 0.5528 m wide. Averages that did not look for edges would reach three.
         let width = 0.02;
         let mut near = 0;
@@ -320,7 +349,7 @@ mod tests {
             assert!(across.abs() < width || (light[1] - right).abs() < 3.0, "{p:?}: {light:?}");
         }
         assert!(near > 50, "{near}");
-        let parts = [0.25, 0.75].map(|share| display.light(rest(share), (total, 0.0625), |_| false));
+        let parts = [0.25, 0.75].map(|share| display.light(rest(share), Some(&weights), |_| false));
         for ((a, b), all) in parts[0].iter().zip(&parts[1]).zip(&filtered) {
             assert!((a[1] + b[1] - all[1]).abs() < 1e-3);
         }

@@ -48,7 +48,7 @@ pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, Model
 pub use plane::{Plane, PlaneError, PlanePoint, PlaneQuestion, PlaneReading};
 
 use crate::Error;
-use display::Display;
+use display::{Display, Weights};
 use edited::Done;
 use light::{Light, MOST_COLUMNS, Strand};
 use paint::Paint;
@@ -57,7 +57,7 @@ use radiosity_transport::live::{Lanes, Live, Target};
 use serde::Serialize;
 use solve::Answer;
 use state::State;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -128,6 +128,8 @@ pub struct Session {
     answer: Answer,
     state: State,
     memory: usize,
+    /// Weights of averages by object, and of which revision they are.
+    weights: Mutex<BTreeMap<usize, (u64, Arc<Weights>)>>,
     /// Layers that were asked for last, by id; the last of them last.
     cache: Mutex<Vec<Kept>>,
 }
@@ -195,6 +197,7 @@ impl Session {
             answer: Answer::default(),
             state: State::dark(),
             memory: options.memory,
+            weights: Mutex::default(),
             cache: Mutex::default(),
         };
         lights.into_iter().for_each(|light| session.add_light(light));

@@ -1,5 +1,6 @@
 //! What is read from a session: the model, layers of light, a place on a surface, its rays.
 
+use super::display::Weights;
 use super::model::{LightKind, Probe};
 use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session, display};
 use glam::DVec2;
@@ -152,17 +153,35 @@ impl Session {
             let (whole, lamps) = (of(&kept.values, element), of(&kept.lamps, element));
             display::Light { lamps, rest: std::array::from_fn(|band| whole[band] - lamps[band]) }
         };
-        let guide =
-            |element| (luminance(of(&self.state.shown, element)) - luminance(of(&self.state.direct, element))).max(0.0);
-        let rays = self.state.solved_rays;
-        // As of rays of which one in two finds light; rarer light is noisier and stays so. An error is not made less.
-        let noise = if rays > 0 && layer != Layer::Error { 1.0 / (rays as f32).sqrt() } else { 0.0 };
         let chunks = self.chunks_of(object.0 as usize);
         let is_buried = |element: u32| {
             let place = chunks.partition_point(|chunk| chunk.first <= element).saturating_sub(1);
             chunks.get(place).is_some_and(|chunk| chunk.is_buried((element - chunk.first) as usize))
         };
-        self.display(object.0 as usize).light(at, (guide, noise), is_buried)
+        // An error is not made less.
+        let weights = (layer != Layer::Error).then(|| self.weights(object.0 as usize, first, is_buried)).flatten();
+        self.display(object.0 as usize).light(at, weights.as_deref(), is_buried)
+    }
+
+    /// By what the light at the vertices of an object is averaged in the state that is shown: found once for all its layers.
+    fn weights(&self, object: usize, first: usize, is_buried: impl Fn(u32) -> bool) -> Option<Arc<Weights>> {
+        let (rays, revision) = (self.state.solved_rays, self.state.revision);
+        if rays == 0 {
+            return None;
+        }
+        let mut known = self.weights.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, weights)) = known.get(&object).filter(|(of, _)| *of == revision) {
+            return Some(weights.clone());
+        }
+        let of = |list: &[Lanes<4>], element: u32| {
+            list.get(first + element as usize).map_or(0.0, |h| luminance([h.0[0], h.0[1], h.0[2]]))
+        };
+        let guide = |element| (of(&self.state.shown, element) - of(&self.state.direct, element)).max(0.0);
+        // As of rays of which one in two finds light; rarer light is noisier and stays so.
+        let noise = 1.0 / (rays as f32).sqrt();
+        let weights = Arc::new(self.display(object).weights(guide, noise, is_buried));
+        known.insert(object, (revision, weights.clone()));
+        Some(weights)
     }
 
     /// Irradiance of each element of an object, in the order of [`ModelObject::indices`]: lux per band.
