@@ -178,6 +178,25 @@ fn points_keep_off_things_and_walls() {
     assert_eq!(refused(PlaneQuestion { uv: [f32::NAN; 2], ..over(0, 0.75, 0.5) }), PlaneError::NoSurface);
 }
 
+/// A house around the room, whose outer walls are an object of their own and look outwards, and a garden around the house that
+/// makes it small: the room is not inside of a thing.
+#[test]
+fn a_room_in_a_house_is_a_room() {
+    let v = DVec3::new;
+    let mut scene = black_room();
+    add_box(&mut scene, "house", v(-0.3, -0.3, -0.3), v(6.3, 3.3, 4.3));
+    add_box(&mut scene, "chest", v(0.9, 0.0, 0.9), v(2.1, 0.9, 2.1));
+    scene.add_quad("garden", 0, [v(-40., -0.3, -40.), v(-40., -0.3, 40.), v(40., -0.3, 40.), v(40., -0.3, -40.)]);
+    let reading = read(&lit(scene, 500), over(0, 0.75, 0.5)).unwrap();
+    let alone = read(&lit(black_room(), 500), over(0, 0.75, 0.5)).unwrap();
+    let is_in_chest = |p: [f64; 3]| p[0] > 0.9 && p[0] < 2.1 && p[2] > 0.9 && p[2] < 2.1;
+    let expected: Vec<[f64; 3]> = alone.points.iter().map(|p| p.position).filter(|p| !is_in_chest(*p)).collect();
+    assert_eq!(reading.points.len(), expected.len());
+    for (point, place) in reading.points.iter().zip(expected) {
+        assert!(DVec3::from(point.position).distance(place.into()) < 1e-6);
+    }
+}
+
 /// A room that stands askew has its grid along its walls.
 #[test]
 fn a_grid_lies_along_the_walls() {

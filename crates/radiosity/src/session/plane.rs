@@ -12,7 +12,7 @@ use super::{ObjectId, Session};
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::live::{Bounds, Target};
+use radiosity_transport::live::{Body, Bounds, Target};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
@@ -81,7 +81,7 @@ pub enum PlaneError {
     #[error("the picked surface is no floor: it is not level, or looks down")]
     NotLevel,
     /// Nothing is left.
-    #[error("the surface is {:.2} m × {:.2} m: nothing is left within the zone of {border} m", size[0], size[1])]
+    #[error("the surface is {:.2} m × {:.2} m: nothing is left within the zone of {border} m (pick a floor, or make the zone smaller)", size[0], size[1])]
     TooNarrow {
         /// Sides of the surface, metres.
         size: [f64; 2],
@@ -275,18 +275,17 @@ impl Session {
 
         let floor = origin.dot(up);
         let is_wall = |index: usize| !self.is_movable(index) || world.bodies[index].bounds.high.dot(up) > floor + WALL;
-        // Fronts look outwards; of what shines and reflects on both sides nobody knows, and a room may be such a thing, too.
-        let is_thing = |index: usize| self.is_movable(index) || !world.bodies[index].shape.has_two_sides;
         let mut things: std::collections::BTreeMap<u32, (Bounds, Vec<usize>)> = std::collections::BTreeMap::new();
         for (index, other) in world.bodies.iter().enumerate().filter(|(_, other)| other.is_present) {
-            if is_thing(index) {
-                let (bounds, bodies) =
-                    things.entry(self.objects[index].group).or_insert_with(|| (other.bounds, Vec::new()));
-                bounds.low = bounds.low.min(other.bounds.low);
-                bounds.high = bounds.high.max(other.bounds.high);
-                bodies.push(index);
-            }
+            let (bounds, bodies) =
+                things.entry(self.objects[index].group).or_insert_with(|| (other.bounds, Vec::new()));
+            bounds.low = bounds.low.min(other.bounds.low);
+            bounds.high = bounds.high.max(other.bounds.high);
+            bodies.push(index);
         }
+        // What is around the picked place is the room, or the house that it is in.
+        let on = picked_place(body, triangle, uv) + world.offset * normal;
+        things.retain(|_, (_, bodies)| self.winding(bodies, on).abs() <= INSIDE);
         Ok(Layout {
             surface,
             origin,
@@ -299,6 +298,11 @@ impl Session {
             is_wall: (0..world.bodies.len()).map(is_wall).collect(),
             things: things.into_values().collect(),
         })
+    }
+
+    /// How many times some objects together go around a point.
+    fn winding(&self, bodies: &[usize], point: DVec3) -> f64 {
+        bodies.iter().map(|body| self.live.world().bodies[*body].winding(point)).sum()
     }
 
     /// Whether a wall stands between two points.
@@ -341,7 +345,7 @@ impl Session {
         let origin = point + world.offset * layout.normal;
         let is_inside = layout.things.iter().any(|(bounds, bodies)| {
             let may_be = origin.cmpge(bounds.low).all() && origin.cmple(bounds.high).all();
-            may_be && bodies.iter().map(|body| world.bodies[*body].winding(origin)).sum::<f64>() > INSIDE
+            may_be && self.winding(bodies, origin) > INSIDE
         });
         if is_inside {
             return Cell::Inside;
@@ -354,14 +358,7 @@ impl Session {
         let PlaneQuestion { object, triangle, uv, height, .. } = plane.question;
         let world = self.live.world();
         let body = &world.bodies[object.0 as usize];
-        let (t, side, mut corners) = body.shape.place(triangle);
-        if side == Side::Back {
-            corners.swap(1, 2);
-        }
-        let weights = DVec2::from(uv.map(f64::from));
-        let on = corners[0] + weights.x * (corners[1] - corners[0]) + weights.y * (corners[2] - corners[0]);
-        let [a, b, c] = body.corners[t];
-        let picked = a + on.x * (b - a) + on.y * (c - a) - layout.origin;
+        let picked = picked_place(body, triangle, uv) - layout.origin;
         let picked = DVec2::new(picked.dot(layout.axes[0]), picked.dot(layout.axes[1]));
 
         // From the nearest cell that is seen from there, over all to which no wall bars the way.
@@ -427,6 +424,18 @@ impl Session {
             points,
         })
     }
+}
+
+/// A place on an object, about the middle of the scene.
+fn picked_place(body: &Body, triangle: u32, uv: [f32; 2]) -> DVec3 {
+    let (t, side, mut corners) = body.shape.place(triangle);
+    if side == Side::Back {
+        corners.swap(1, 2);
+    }
+    let weights = DVec2::from(uv.map(f64::from));
+    let on = corners[0] + weights.x * (corners[1] - corners[0]) + weights.y * (corners[2] - corners[0]);
+    let [a, b, c] = body.corners[t];
+    a + on.x * (b - a) + on.y * (c - a)
 }
 
 /// An object that is less than this part of the scene wide is taken for one that can be moved.
