@@ -142,7 +142,8 @@ export const FRAGMENT = /* glsl */ `
 /** Values that all surfaces share. */
 export const shared = {
   mode: { value: Mode.Eye },
-  exposure: { value: 1 },
+  /** Dark until the light has been metered: rooms with daylight would be white till then. */
+  exposure: { value: 0 },
   emissionShown: { value: 1 },
   range: { value: [10, 1000] },
   palette: { value: PALETTE.map((c) => new Vector3(...c)) },
