@@ -2,7 +2,7 @@
 //! into four, until the error is as asked. Corners of cells are corners of the next, so hardly anything is evaluated
 //! twice.
 
-use super::cell::{Cell, Domain, Piece, Shaded};
+use super::cell::{Cell, Domain, Piece, Shaded, Sights};
 use super::clear::Exchange;
 
 /// Share of the tolerance by which places may miss the closed form of all.
@@ -13,9 +13,14 @@ const MOST: usize = 65_536;
 
 /// Integrates over the pieces of a polygon past the panels listed until the error meets the tolerance, or the cells run out.
 /// `whole` is the integral of what is visible and what is hidden; the answer that of what is visible.
-pub fn integrate(pieces: &[Piece], (whole, tolerance): (f64, f64), shaded: &mut impl Shaded, list: &[u16]) -> Exchange {
+pub fn integrate(
+    pieces: &[Piece],
+    (whole, tolerance): (f64, f64),
+    (shaded, sights): (&mut impl Shaded, &mut Sights),
+    list: &[u16],
+) -> Exchange {
     let is_steep = shaded.is_steep();
-    let mut domain = Domain::new(pieces, shaded);
+    let mut domain = Domain::new(pieces, shaded, sights);
     let mut cells = domain.whole(list, false);
     if cells.iter().all(Cell::is_hidden) {
         return Exchange::default();
@@ -104,12 +109,11 @@ mod tests {
             let c = (f64::from(i) + 0.37) / 200.0;
             for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
                 for (shape, exact) in [(&square, over_square(c)), (&triangle, over_triangle(c))] {
-                    let found = integrate(
-                        &[Piece { frame: *shape, side: 0 }],
-                        (2.0 * shape.area(), tolerance),
-                        &mut Plain(|x: DVec3| (x.x + x.y - c).max(0.0)),
-                        &[],
-                    );
+                    let mut plain = Plain(|x: DVec3| (x.x + x.y - c).max(0.0));
+                    let mut sights = Sights::default();
+                    sights.clear(&shape.corners());
+                    let pieces = [Piece { frame: *shape, side: 0 }];
+                    let found = integrate(&pieces, (2.0 * shape.area(), tolerance), (&mut plain, &mut sights), &[]);
                     assert!(found.error <= tolerance);
                     all += 1;
                     missed += usize::from((found.value - exact).abs() > found.error.max(1e-14));

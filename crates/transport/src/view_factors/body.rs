@@ -92,6 +92,26 @@ impl Occluder {
         Some(occluder)
     }
 
+    /// The same without the edges that cut nothing off, whatever place of `region` is looked from; none if it hides nothing
+    /// from any. Four points x, p, q, y span a volume that is linear in each, so corners tell of all that is between them.
+    pub fn before(mut self, region: &[DVec3], setting: Setting) -> Option<Occluder> {
+        let mut hides = true;
+        self.edges.retain(|Line { ends: [p, q], .. }| {
+            let margin = setting.touch * p.distance_squared(*q);
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for y in setting.target {
+                let normal = (*p - *y).cross(*q - *y);
+                for x in region {
+                    let volume = normal.dot(*x - *y);
+                    (low, high) = (low.min(volume), high.max(volume));
+                }
+            }
+            hides &= high >= 0.0;
+            low < margin
+        });
+        hides.then_some(self)
+    }
+
     /// A panel: its side that looks towards the place.
     fn panel(panel: &Panel, place: DVec3) -> Occluder {
         let is_above = panel.height(place) > 0.0;
@@ -133,5 +153,55 @@ impl Line {
     /// The edge between two ends.
     pub fn new(ends: [DVec3; 2]) -> Line {
         Line { ends, along: (ends[1] - ends[0]).normalize_or_zero() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view_factors::visible::{Shadows, Sight};
+    use radiosity_trace::sampling::Random;
+
+    /// Panels at random places between two squares: what is seen of one from the other is the same without the edges that are
+    /// left out, of which there are some, and panels that are left out hide nothing.
+    #[test]
+    fn edges_that_cut_nothing_are_left_out() {
+        let mut random = Random::new(5);
+        let mut unit = || 2.0 * random.next_unit() - 1.0;
+        let p = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let region = [p(-0.5, -0.5, 0.), p(0.5, -0.5, 0.), p(0.5, 0.5, 0.), p(-0.5, 0.5, 0.)];
+        let target = [p(-0.2, 0.5, 3.), p(0.5, 0.5, 3.), p(0.5, -0.2, 3.), p(-0.2, -0.2, 3.)];
+        let (mut left_out, mut partly) = ([0, 0], 0);
+        for _ in 0..400 {
+            let (low, width) = ([unit(), unit()], [1.0 + unit(), 1.0 + unit()]);
+            let (tilt, z) = (0.5 * unit(), 1.5 + unit());
+            let corner = |u: f64, v: f64| p(low[0] + u * width[0], low[1] + v * width[1], z + tilt * (u - 0.5));
+            let corners = vec![corner(0., 0.), corner(1., 0.), corner(1., 1.), corner(0., 1.)];
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+            let panel = Panel::new(corners, normal);
+            let obstacles = Obstacles { panels: &[], solids: &[] };
+            let setting = Setting { panels: &[&panel], obstacles, target: &target, touch: 1e-7 };
+            let Some(plain) = Occluder::new(Body::Panel(0), setting, DVec3::ZERO) else { continue };
+            let fewer = plain.clone().before(&region, setting);
+            left_out[0] += usize::from(fewer.is_none());
+            left_out[1] += fewer.as_ref().map_or(0, |fewer| plain.edges.len() - fewer.edges.len());
+            for _ in 0..20 {
+                let place = (p(0.5 * unit(), 0.5 * unit(), 0.0), DVec3::Z);
+                let visible = |occluder: Option<&Occluder>| match Shadows::default().sight(
+                    place,
+                    &target,
+                    occluder.map(|o| (0, o)).into_iter(),
+                    1e-7,
+                ) {
+                    Sight::Whole => f64::INFINITY,
+                    Sight::Nothing(_) => 0.0,
+                    Sight::Partly { factors: [visible, _], .. } => visible,
+                };
+                let (all, found) = (visible(Some(&plain)), visible(fewer.as_ref()));
+                assert!(all == found || (all - found).abs() < 1e-14, "{all} {found}");
+                partly += usize::from(all > 0.0 && all.is_finite());
+            }
+        }
+        assert!(left_out[0] > 40 && left_out[1] > 300 && partly > 1000, "{left_out:?} {partly}");
     }
 }

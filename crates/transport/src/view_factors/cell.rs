@@ -189,26 +189,51 @@ fn share([visible, hidden]: [f64; 2]) -> f64 {
     if visible + hidden > 0.0 { (visible / (visible + hidden)).clamp(0.0, 1.0) } else { 0.5 }
 }
 
-/// A polygon as pieces, and what was seen so far from corners of its cells.
-pub struct Domain<'a, S> {
-    pieces: &'a [Piece],
-    shaded: &'a mut S,
-    /// Whether cells take the closed form of all that they see.
-    is_known: bool,
-    /// By the side and the place, on a grid that is finer than the cells of all but the narrowest pieces: pieces share corners.
-    sights: FxHashMap<(u16, [i32; 3]), Sight>,
-    /// Lines of that grid in a metre.
+/// What was seen from corners of cells: by the side and the place, on a grid that is finer than the cells of all but the
+/// narrowest pieces. Cells share corners, and so do polygons side by side.
+#[derive(Default)]
+pub struct Sights {
+    seen: FxHashMap<(u16, [i32; 3]), Sight>,
+    from: DVec3,
+    /// Lines of the grid in a metre.
     grid: f64,
 }
 
 /// Lines of the grid along the longest edge.
 const LINES: f64 = 1e6;
 
+/// Sights for which memory is kept; to clear more takes longer than to ask for it anew.
+const KEPT: usize = 1024;
+
+impl Sights {
+    /// Forgets all, and lays the grid over a region.
+    pub fn clear(&mut self, region: &[DVec3]) {
+        if self.seen.capacity() > 2 * KEPT {
+            self.seen = FxHashMap::default();
+        }
+        self.seen.clear();
+        self.from = region[0];
+        let extent = region.iter().map(|p| p.distance(region[0])).fold(f64::MIN_POSITIVE, f64::max);
+        self.grid = LINES / extent;
+    }
+
+    fn place(&self, place: DVec3) -> [i32; 3] {
+        ((place - self.from) * self.grid).to_array().map(|x| x.round() as i32)
+    }
+}
+
+/// A polygon as pieces, and what was seen so far.
+pub struct Domain<'a, S> {
+    pieces: &'a [Piece],
+    shaded: &'a mut S,
+    sights: &'a mut Sights,
+    /// Whether cells take the closed form of all that they see.
+    is_known: bool,
+}
+
 impl<'a, S: Shaded> Domain<'a, S> {
-    pub fn new(pieces: &'a [Piece], shaded: &'a mut S) -> Self {
-        let edges = pieces.iter().flat_map(|piece| piece.frame.edges);
-        let grid = LINES / edges.map(|edge| edge.length()).fold(f64::MIN_POSITIVE, f64::max);
-        Domain { pieces, shaded, is_known: false, sights: FxHashMap::default(), grid }
+    pub fn new(pieces: &'a [Piece], shaded: &'a mut S, sights: &'a mut Sights) -> Self {
+        Domain { pieces, shaded, sights, is_known: false }
     }
 
     /// The cells that together are all of it, past the panels listed; with `is_known` they take the closed form of all.
@@ -249,9 +274,8 @@ impl<'a, S: Shaded> Domain<'a, S> {
     }
 
     fn corner(&mut self, side: u16, place: DVec3, list: &[u16]) -> Sight {
-        let from = self.pieces[0].frame.origin;
-        let on_grid = ((place - from) * self.grid).to_array().map(|x| x.round() as i32);
-        *self.sights.entry((side, on_grid)).or_insert_with(|| self.shaded.sight(side, place, list))
+        let on_grid = self.sights.place(place);
+        *self.sights.seen.entry((side, on_grid)).or_insert_with(|| self.shaded.sight(side, place, list))
     }
 
     /// A cell of one past the panels listed.

@@ -1,8 +1,8 @@
 //! View factors of an enclosure: the default way, chosen pair by pair.
 //!
-//! Pairs are judged in clusters first (`cluster`, `shaft`): facing away, proven blocked, proven clear, or mixed. Clear
+//! Pairs are judged in clusters first (`walk`, `cluster`, `shaft`): facing away, proven blocked, proven clear, or mixed. Clear
 //! ones take cubature or the closed form (`clear`); mixed ones the exact visible factor from points of one part (`mixed`,
-//! `visible`). The exchange area A_i F_ij is stored once per pair, so reciprocity holds by storage; what the rows lack
+//! `visible`), of which neighbours in a leaf share what they can. The exchange area A_i F_ij is stored once per pair, so reciprocity holds by storage; what the rows lack
 //! of one is therefore an honest measure of the error, and is reported before any repair (`closure`).
 
 mod adaptive;
@@ -20,6 +20,7 @@ mod sides;
 mod solid;
 mod store;
 mod visible;
+mod walk;
 
 pub(crate) use clear::Exchange;
 pub use closure::{Closure, Repair};
@@ -28,19 +29,17 @@ pub use store::ViewFactors;
 
 use crate::row::GpuError;
 use crate::{Progress, Stopped};
-use clear::clear;
+use cell::Sights;
 use cluster::Clusters;
-use mixed::mixed;
-use panel::Panel;
 pub(crate) use panel::{Planes, convex_pieces, panels, united};
 use part::Part;
-use radiosity_scene::{Enclosure, Facet};
+use radiosity_scene::Enclosure;
 use rayon::prelude::*;
 use serde::Serialize;
-use shaft::{Look, Shaft, Stands};
-use solid::{Obstacles, Solid, find_solids};
+use solid::find_solids;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use visible::Shadows;
+use walk::Walk;
 
 /// How exact the factors are to be, and what they may take.
 #[derive(Clone, Copy, Debug)]
@@ -127,13 +126,6 @@ impl Choices {
 /// coordinates. Sheets closer than this block each other no more.
 pub(crate) const TOUCH: f64 = 5e-7;
 
-/// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
-const WHOLE: f64 = 0.05;
-
-/// Least share of the accuracy that a pair of facets is asked for, where surfaces have many: their errors hardly add
-/// up.
-const LEAST: f64 = 0.1;
-
 /// Bytes that a pair takes at most, while it is found and put in order.
 const BYTES: usize = 2 * size_of::<Entry>();
 
@@ -172,6 +164,7 @@ pub fn view_factors(
             options,
             touch,
             shadows: Shadows::default(),
+            sights: Sights::default(),
             choices: Choices::default(),
             entries: Vec::new(),
         };
@@ -190,137 +183,4 @@ pub fn view_factors(
     let mut choices = Choices::default();
     found.iter().for_each(|(_, c)| choices.add(c));
     Ok(ViewFactors::new(areas, found.into_iter().map(|(entries, _)| entries), choices))
-}
-
-/// One block of parts on its way through the tree.
-struct Walk<'a> {
-    enclosure: &'a Enclosure,
-    /// Areas of the surfaces, m².
-    areas: &'a [f64],
-    clusters: &'a Clusters,
-    panels: &'a [Panel],
-    solids: &'a [Solid],
-    options: &'a ViewFactorOptions,
-    touch: f64,
-    shadows: Shadows,
-    choices: Choices,
-    entries: Vec<Entry>,
-}
-
-impl Walk<'_> {
-    /// All pairs of parts of `a` with later ones of `b`, past the panels `between`.
-    fn visit(&mut self, a: u32, b: u32, between: &[u32]) {
-        let (from, to) = (&self.clusters.nodes[a as usize], &self.clusters.nodes[b as usize]);
-        // Every pair once: the second part comes after the first.
-        if to.parts.end <= from.parts.start + 1 {
-            return;
-        }
-        let pairs = || pairs(from.parts.clone(), to.parts.clone());
-        let behind = |plane: &Option<(glam::DVec3, f64)>, hull: &[glam::DVec3]| {
-            plane.is_some_and(|(normal, offset)| hull.iter().all(|c| normal.dot(*c) - offset <= self.touch))
-        };
-        if behind(&from.plane, &to.hull) || behind(&to.plane, &from.hull) {
-            self.choices.facing_away += pairs();
-            return;
-        }
-        let mut left: Vec<u32> = Vec::with_capacity(between.len());
-        let normals = [from, to].map(|cluster| cluster.plane.map_or(glam::DVec3::ZERO, |(normal, _)| normal));
-        let mut shaft = Shaft::new([&from.hull, &to.hull], normals, self.touch);
-        for &panel in between {
-            let corners = &self.panels[panel as usize];
-            if behind(&from.plane, &corners.corners) || behind(&to.plane, &corners.corners) {
-                continue;
-            }
-            match shaft.stands(corners, Look::Rough) {
-                Stands::Aside => {}
-                Stands::Between => left.push(panel),
-                Stands::Across => {
-                    self.choices.blocked += pairs();
-                    return;
-                }
-            }
-        }
-        match (from.halves, to.halves) {
-            (None, None) => self.parts(from.parts.clone(), to.parts.clone(), &left),
-            (Some(halves), other) if other.is_none() || from.extent > to.extent => {
-                halves.into_iter().for_each(|half| self.visit(half, b, &left));
-            }
-            (_, Some(halves)) => halves.into_iter().for_each(|half| self.visit(a, half, &left)),
-            (Some(_), None) => {}
-        }
-    }
-
-    fn parts(&mut self, from: std::ops::Range<usize>, to: std::ops::Range<usize>, between: &[u32]) {
-        for i in from {
-            for j in to.clone().filter(|j| *j > i) {
-                self.pair(i, j, between);
-            }
-        }
-    }
-
-    /// Error of A_i F_ij that two parts may have: their share of what their surfaces may, m².
-    fn tolerance(&self, a: &Part, b: &Part) -> f64 {
-        let (area, other) = (a.shape.area(), b.shape.area());
-        let [i, j] = [a, b].map(|part| self.enclosure.surface_of[part.facet as usize]);
-        let of_surface = self.areas[i as usize].max(self.areas[j as usize]);
-        let times = if i == j { 2.0 } else { 1.0 };
-        self.options.accuracy * (area * other / (times * of_surface)).max(LEAST * area.min(other))
-    }
-
-    fn pair(&mut self, i: usize, j: usize, between: &[u32]) {
-        let (a, b) = (&self.clusters.parts[i], &self.clusters.parts[j]);
-        let reach = |part: &Part, other: &Part| {
-            let heights = other.shape.corners().iter().map(|c| part.shape.height(*c));
-            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)))
-        };
-        let ((low_b, high_b), (low_a, high_a)) = (reach(a, b), reach(b, a));
-        if high_a <= self.touch || high_b <= self.touch {
-            self.choices.facing_away += 1;
-            return;
-        }
-        let cut = low_a < -self.touch || low_b < -self.touch;
-        let mut panels: Vec<&Panel> = Vec::new();
-        let ends = [&a.shape, &b.shape];
-        let mut shaft = Shaft::new(ends.map(Facet::corners), ends.map(Facet::normal), self.touch);
-        for &panel in between {
-            let panel = &self.panels[panel as usize];
-            let behind = |part: &Part| panel.corners.iter().all(|c| part.shape.height(*c) <= self.touch);
-            if behind(a) || behind(b) {
-                continue;
-            }
-            match shaft.stands(panel, Look::Close) {
-                Stands::Aside => {}
-                Stands::Between => panels.push(panel),
-                Stands::Across => {
-                    self.choices.blocked += 1;
-                    return;
-                }
-            }
-        }
-        let least = a.shape.area().min(b.shape.area());
-        let tolerance = self.tolerance(a, b);
-        // Past panels the whole is asked for little more exactly than what is left of it.
-        let of_whole = if panels.is_empty() { self.options.clear_accuracy * least } else { WHOLE * tolerance };
-        let (whole, order) = clear(a, b, of_whole, cut);
-        let exchange = if panels.is_empty() {
-            match order {
-                0 => self.choices.clear_closed_form += 1,
-                order => self.choices.clear_cubature[order - 1] += 1,
-            }
-            whole
-        } else {
-            self.choices.clipped += 1;
-            let obstacles = Obstacles { panels: self.panels, solids: self.solids };
-            let tolerance = (tolerance - whole.error).max(0.5 * tolerance);
-            mixed(&mut self.shadows, [a, b], (&mut panels, obstacles), whole, tolerance, self.touch)
-        };
-        if exchange.value > 0.0 || exchange.error > 0.0 {
-            self.entries.push(Entry::new(a.facet, b.facet, exchange));
-        }
-    }
-}
-
-/// Pairs (i, j) with i < j from two ranges, of which the first is not after the second.
-fn pairs(from: std::ops::Range<usize>, to: std::ops::Range<usize>) -> usize {
-    from.map(|i| to.end.saturating_sub(to.start.max(i + 1))).sum()
 }

@@ -34,19 +34,40 @@ pub enum Look {
 /// Corners of an end at most: those of a box, or of a part with a corner cut off.
 const MOST: usize = if CORNERS + 1 > 8 { CORNERS + 1 } else { 8 };
 
-/// Heights of the corners of an end above a plane.
-struct Over {
-    heights: [f64; MOST],
-    count: usize,
+/// Corners whose heights above a plane are asked for. Nearly all ends have four, and loops whose length is known take a third
+/// of the time.
+trait Corners {
+    type Heights: AsRef<[f64]>;
+
+    fn over(&self, plane: (DVec3, f64)) -> Self::Heights;
 }
 
-impl std::ops::Deref for Over {
-    type Target = [f64];
+impl Corners for [DVec3; 4] {
+    type Heights = [f64; 4];
 
-    #[inline]
-    fn deref(&self) -> &[f64] {
-        &self.heights[..self.count.min(MOST)]
+    #[inline(always)]
+    fn over(&self, (normal, offset): (DVec3, f64)) -> [f64; 4] {
+        let [a, b, c, d] = self;
+        [normal.dot(*a) - offset, normal.dot(*b) - offset, normal.dot(*c) - offset, normal.dot(*d) - offset]
     }
+}
+
+impl Corners for [DVec3] {
+    type Heights = SmallVec<[f64; MOST]>;
+
+    fn over(&self, (normal, offset): (DVec3, f64)) -> SmallVec<[f64; MOST]> {
+        self.iter().map(|corner| normal.dot(*corner) - offset).collect()
+    }
+}
+
+#[inline(always)]
+fn least(heights: &[f64]) -> f64 {
+    heights.iter().fold(f64::INFINITY, |least, h| if *h < least { *h } else { least })
+}
+
+#[inline(always)]
+fn most(heights: &[f64]) -> f64 {
+    heights.iter().fold(f64::NEG_INFINITY, |most, h| if *h > most { *h } else { most })
 }
 
 /// A plane: a normal n, n · x of its points, and n · x by which points count as lying on it.
@@ -74,25 +95,61 @@ impl<'a> Shaft<'a> {
 
     /// What `panel` does to the segments from one end to the other.
     pub fn stands(&mut self, panel: &Panel, look: Look) -> Stands {
+        let [a, b] = self.ends;
+        let found = match (a.try_into(), b.try_into()) {
+            (Ok(a), Ok(b)) => self.by_edges::<[DVec3; 4]>(panel, a, b),
+            _ => self.by_edges(panel, a, b),
+        };
+        let is_beside = |(outwards, offset, reach): &Plane| {
+            let least = offset - reach;
+            panel.corners.iter().all(|c| outwards.dot(*c) >= least)
+        };
+        let is_open = found == Stands::Between && look == Look::Close && !self.is_hit(panel);
+        let is_aside = is_open && self.sides().iter().any(is_beside);
+        if is_aside { Stands::Aside } else { found }
+    }
+
+    /// Whether a panel stands between the middles of both ends.
+    fn is_hit(&self, panel: &Panel) -> bool {
+        let [a, b] = self.ends.map(|end| end.iter().sum::<DVec3>() / end.len() as f64);
+        let (h, k) = (panel.height(a), panel.height(b));
+        let share = h / (h - k);
+        let place = a + share * (b - a);
+        share > 0.0
+            && share < 1.0
+            && panel.rims.iter().all(|(inwards, offset)| inwards.dot(place) > offset + self.touch)
+    }
+
+    /// What `panel` does, by its edges.
+    #[inline(always)]
+    fn by_edges<C: Corners + ?Sized>(&self, panel: &Panel, a_end: &C, b_end: &C) -> Stands {
         let touch = self.touch;
-        let (a, b) = (self.over(0, panel.normal, panel.offset), self.over(1, panel.normal, panel.offset));
-        let side = |h: &Over| (h.iter().all(|h| *h >= -touch), h.iter().all(|h| *h <= touch));
-        let ((a_above, a_below), (b_above, b_below)) = (side(&a), side(&b));
+        let plane = (panel.normal, panel.offset);
+        let (a, b) = (a_end.over(plane), b_end.over(plane));
+        let (a, b) = (a.as_ref(), b.as_ref());
+        let side = |h: &[f64]| (least(h) >= -touch, most(h) <= touch);
+        let ((a_above, a_below), (b_above, b_below)) = (side(a), side(b));
         if (a_above && b_above) || (a_below && b_below) {
             return Stands::Aside;
         }
         let is_parted = (a_above && b_below) || (a_below && b_above);
         let mut all_within = true;
-        for &(inwards, offset) in &panel.rims {
-            let (e, f) = (self.over(0, inwards, offset), self.over(1, inwards, offset));
-            let mut crossings = Crossings { touch, outside: true, within: true };
-            crossings.between([&a, &b], [&e, &f]);
-            if !is_parted {
-                crossings.between([&a, &a], [&e, &e]);
-                crossings.between([&b, &b], [&f, &f]);
+        for &rim in &panel.rims {
+            let (e, f) = (a_end.over(rim), b_end.over(rim));
+            let (e, f) = (e.as_ref(), f.as_ref());
+            // What is joined lies between its ends: where those lie on one side of the edge, segments need not be looked at.
+            if most(e) <= touch && most(f) <= touch {
+                return Stands::Aside;
             }
-            crossings.in_plane(&a, &e);
-            crossings.in_plane(&b, &f);
+            let is_within = least(e) >= -touch && least(f) >= -touch;
+            let mut crossings = Crossings { touch, outside: true, within: true, is_within };
+            crossings.between([a, b], [e, f]);
+            if !is_parted {
+                crossings.between([a, a], [e, e]);
+                crossings.between([b, b], [f, f]);
+            }
+            crossings.in_plane(a, e);
+            crossings.in_plane(b, f);
             if crossings.outside {
                 return Stands::Aside;
             }
@@ -100,26 +157,11 @@ impl<'a> Shaft<'a> {
         }
         // What lies in the panel itself looks away from it: a polygon only touches it there, a box may hold whole
         // parts.
-        let is_off = |end: usize, h: &Over| self.normals[end] != DVec3::ZERO || h.iter().all(|h| h.abs() > touch);
-        if all_within && is_parted && is_off(0, &a) && is_off(1, &b) {
+        let is_off = |end: usize, h: &[f64]| self.normals[end] != DVec3::ZERO || h.iter().all(|h| h.abs() > touch);
+        if all_within && is_parted && is_off(0, a) && is_off(1, b) {
             return Stands::Across;
         }
-        let is_beside = |(outwards, offset, reach): &Plane| {
-            let least = offset - reach;
-            panel.corners.iter().all(|c| outwards.dot(*c) >= least)
-        };
-        let is_aside = look == Look::Close && self.sides().iter().any(is_beside);
-        if is_aside { Stands::Aside } else { Stands::Between }
-    }
-
-    /// Heights of the corners of an end above a plane.
-    #[inline]
-    fn over(&self, end: usize, normal: DVec3, offset: f64) -> Over {
-        let mut over = Over { heights: [0.0; MOST], count: self.ends[end].len() };
-        for (height, corner) in over.heights.iter_mut().zip(self.ends[end]) {
-            *height = normal.dot(*corner) - offset;
-        }
-        over
+        Stands::Between
     }
 
     /// What of a panel lies in the shaft between two polygons; empty if nothing.
@@ -144,11 +186,13 @@ struct Crossings {
     touch: f64,
     outside: bool,
     within: bool,
+    /// Whether they are known to be within.
+    is_within: bool,
 }
 
 impl Crossings {
     /// Segments between two sets of corners, by their heights above the plane and their distances within the edge.
-    #[inline]
+    #[inline(always)]
     fn between(&mut self, heights: [&[f64]; 2], inside: [&[f64]; 2]) {
         for (a, e) in heights[0].iter().zip(inside[0]) {
             for (b, f) in heights[1].iter().zip(inside[1]) {
@@ -158,13 +202,15 @@ impl Crossings {
                     self.within &= within >= -self.touch * length;
                 }
             }
-            if !(self.outside || self.within) {
+            if !self.outside && (self.is_within || !self.within) {
+                self.within |= self.is_within;
                 return;
             }
         }
     }
 
     /// Corners in the plane are met there, and a crossing next to one may get lost in rounding.
+    #[inline(always)]
     fn in_plane(&mut self, heights: &[f64], inside: &[f64]) {
         for (_, e) in heights.iter().zip(inside).filter(|(h, _)| h.abs() <= self.touch) {
             self.outside &= *e <= self.touch;

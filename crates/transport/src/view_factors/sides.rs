@@ -9,8 +9,7 @@
 use super::body::{Body, Line, Occluder, Setting};
 use super::cell::Piece;
 use super::frame::Frame;
-use super::panel::Panel;
-use super::visible::{Loop, keep_above};
+use super::visible::{Loop, cut_off};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -30,77 +29,83 @@ const MANY: usize = 64;
 type Plane = (DVec3, f64);
 
 /// Cuts pieces of a convex polygon by a plane.
-fn cut(pieces: &mut Vec<Loop>, (normal, offset): Plane, size: f64) {
+fn cut(pieces: &mut Vec<Loop>, plane: Plane, size: f64) {
+    let (normal, offset) = plane;
     let mut k = 0;
     let all = pieces.len();
     while k < all && pieces.len() < MANY {
-        let (low, high) = range(&pieces[k], normal, offset);
-        if low < -NARROW * size && high > NARROW * size {
-            let mut below = pieces[k].clone();
-            if keep_above(&mut below, -normal, -offset) && keep_above(&mut pieces[k], normal, offset) {
-                pieces.push(below);
-            }
+        if is_crossed(&pieces[k], plane, size) {
+            let below = cut_off(&mut pieces[k], normal, offset);
+            pieces.extend(below);
         }
         k += 1;
     }
 }
 
-fn range(polygon: &[DVec3], normal: DVec3, offset: f64) -> (f64, f64) {
+/// Whether a polygon of a size (m) lies on both sides of a plane, by more than nothing.
+#[inline]
+fn is_crossed(polygon: &[DVec3], (normal, offset): Plane, size: f64) -> bool {
     let heights = polygon.iter().map(|p| normal.dot(*p) - offset);
-    heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)))
+    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
+    low < -NARROW * size && high > NARROW * size
 }
 
-/// The plane in which the shadow of an edge falls along a parallel one all at once, if it crosses `piece` where both
-/// take part: seen from there, the visible factor has a kink.
-fn meeting(piece: &[DVec3], edge: &Line, of_target: &Line, size: f64) -> Option<Plane> {
-    let along = edge.along;
-    if along.cross(of_target.along).length_squared() > PARALLEL * PARALLEL {
-        return None;
-    }
-    let normal = along.cross(of_target.ends[0] - edge.ends[0]).try_normalize()?;
-    let offset = normal.dot(edge.ends[0]);
-    let (low, high) = range(piece, normal, offset);
-    if !(low < -NARROW * size && high > NARROW * size) {
-        return None;
-    }
-    // In the plane: along the edges, and across, from the edge of the target.
-    let across = normal.cross(along);
-    let base = across.dot(of_target.ends[0]);
-    let height = across.dot(edge.ends[0]) - base;
-    let (mut reach, mut share) = ((f64::INFINITY, f64::NEG_INFINITY), (f64::INFINITY, f64::NEG_INFINITY));
-    let n = piece.len();
-    for i in 0..n {
-        let (p, q) = (piece[i], piece[(i + 1) % n]);
-        let (h, k) = (normal.dot(p) - offset, normal.dot(q) - offset);
-        if (h > 0.0) != (k > 0.0) {
-            let x = p + h / (h - k) * (q - p);
-            let s = along.dot(x);
-            reach = (reach.0.min(s), reach.1.max(s));
-            let of_edge = height / (across.dot(x) - base);
-            share = (share.0.min(of_edge), share.1.max(of_edge));
+/// An edge and a parallel one of the target, or of another body: seen from their common plane, the shadow of one falls along
+/// the other all at once, and the visible factor has a kink.
+struct Meeting {
+    plane: Plane,
+    along: DVec3,
+    edge: [DVec3; 2],
+    other: [DVec3; 2],
+}
+
+impl Meeting {
+    fn new(edge: &Line, other: &Line) -> Option<Meeting> {
+        let along = edge.along;
+        if along.cross(other.along).length_squared() > PARALLEL * PARALLEL {
+            return None;
         }
+        let normal = along.cross(other.ends[0] - edge.ends[0]).try_normalize()?;
+        Some(Meeting { plane: (normal, normal.dot(edge.ends[0])), along, edge: edge.ends, other: other.ends })
     }
-    // The edge lies between, at `share` of the way from the target.
-    if !(share.1 > 0.0 && share.0 < 1.0) {
-        return None;
-    }
-    let span = |[p, q]: [DVec3; 2]| {
-        let (a, b) = (along.dot(p), along.dot(q));
-        (a.min(b), a.max(b))
-    };
-    let (e, t) = (span(edge.ends), span(of_target.ends));
-    let (s0, s1) = (share.0.max(0.0), share.1.min(1.0));
-    let least = [s0, s1].map(|s| t.0 + s * (reach.0 - t.0)).into_iter().fold(f64::INFINITY, f64::min);
-    let most = [s0, s1].map(|s| t.1 + s * (reach.1 - t.1)).into_iter().fold(f64::NEG_INFINITY, f64::max);
-    (e.0 < most && e.1 > least).then_some((normal, offset))
-}
 
-/// A polygon cut where what it sees has kinks, and what throws shadows on its pieces.
-pub struct Sides {
-    /// The pieces.
-    pub pieces: Vec<Piece>,
-    /// The bodies as seen from each side, in their order.
-    pub sides: Vec<Vec<Seen>>,
+    /// Whether the plane crosses `piece` where both edges take part.
+    fn crosses(&self, piece: &[DVec3], size: f64) -> bool {
+        let Meeting { plane: (normal, offset), along, edge, other } = *self;
+        if !is_crossed(piece, self.plane, size) {
+            return false;
+        }
+        // In the plane: along the edges, and across, from the other edge.
+        let across = normal.cross(along);
+        let base = across.dot(other[0]);
+        let height = across.dot(edge[0]) - base;
+        let (mut reach, mut share) = ((f64::INFINITY, f64::NEG_INFINITY), (f64::INFINITY, f64::NEG_INFINITY));
+        let n = piece.len();
+        for i in 0..n {
+            let (p, q) = (piece[i], piece[(i + 1) % n]);
+            let (h, k) = (normal.dot(p) - offset, normal.dot(q) - offset);
+            if (h > 0.0) != (k > 0.0) {
+                let x = p + h / (h - k) * (q - p);
+                let s = along.dot(x);
+                reach = (reach.0.min(s), reach.1.max(s));
+                let of_edge = height / (across.dot(x) - base);
+                share = (share.0.min(of_edge), share.1.max(of_edge));
+            }
+        }
+        // The edge lies between, at `share` of the way from the other.
+        if !(share.1 > 0.0 && share.0 < 1.0) {
+            return false;
+        }
+        let span = |[p, q]: [DVec3; 2]| {
+            let (a, b) = (along.dot(p), along.dot(q));
+            (a.min(b), a.max(b))
+        };
+        let (e, t) = (span(edge), span(other));
+        let (s0, s1) = (share.0.max(0.0), share.1.min(1.0));
+        let least = [s0, s1].map(|s| t.0 + s * (reach.0 - t.0)).into_iter().fold(f64::INFINITY, f64::min);
+        let most = [s0, s1].map(|s| t.1 + s * (reach.1 - t.1)).into_iter().fold(f64::NEG_INFINITY, f64::max);
+        e.0 < most && e.1 > least
+    }
 }
 
 /// A body as seen from a side.
@@ -120,62 +125,123 @@ impl Seen {
     }
 }
 
-/// Cuts a convex polygon of a size (m) by the planes of faces that cross it, and then where edges of bodies meet
-/// parallel ones.
-pub fn sides(from: &[DVec3], size: f64, bodies: &[Body], setting: Setting) -> Sides {
-    let mut pieces: Vec<Loop> = vec![from.into()];
-    for face in bodies.iter().flat_map(|body| body.faces(setting)) {
-        cut(&mut pieces, (face.normal, face.offset), size);
-    }
-    let target = setting.target;
-    let outline: SmallVec<[Line; 6]> =
-        (0..target.len()).map(|i| Line::new([target[i], target[(i + 1) % target.len()]])).collect();
-    let mut found = Sides { pieces: Vec::new(), sides: Vec::new() };
-    for piece in pieces {
-        let centre = piece.iter().sum::<DVec3>() / piece.len() as f64;
-        let crosses = |face: &Panel| {
-            let (low, high) = range(&piece, face.normal, face.offset);
-            low < -NARROW * size && high > NARROW * size
-        };
-        let seen = |body: &Body| match Occluder::new(*body, setting, centre) {
-            _ if body.faces(setting).any(crosses) => Seen::Varying,
-            Some(occluder) => Seen::As(occluder),
-            None => Seen::Nothing,
-        };
-        let side: Vec<Seen> = bodies.iter().map(seen).collect();
-        let mut parts = vec![piece.clone()];
-        for plane in meetings(&piece, size, &side, &outline) {
-            cut(&mut parts, plane, size);
-        }
-        let number = found.sides.len() as u16;
-        let frames = parts.iter().flat_map(|part| Frame::of(part));
-        found.pieces.extend(frames.map(|frame| Piece { frame, side: number }));
-        found.sides.push(side);
-    }
-    found
+/// On which side of the planes of faces a piece lies: 1 or −1, or 0 where one still crosses it.
+type Signs = SmallVec<[i8; 8]>;
+
+/// All that lies alike to the planes of faces.
+struct Side {
+    signs: Signs,
+    /// The bodies as seen from there, in their order.
+    seen: Vec<Seen>,
+    meetings: Vec<Meeting>,
 }
 
-/// The planes in which edges of bodies meet the target's, and those of other bodies while they are few.
-fn meetings(piece: &[DVec3], size: f64, side: &[Seen], outline: &[Line]) -> SmallVec<[Plane; 16]> {
-    let mut planes = SmallVec::new();
-    for (k, occluder) in side.iter().enumerate() {
-        let before = if side.len() <= FEW { &side[..k] } else { &[] };
-        let others = || before.iter().flat_map(Seen::edges);
+/// How polygons in a region of a plane are cut, and what throws shadows on the pieces.
+pub struct Sides {
+    /// A polygon that holds the region.
+    region: Loop,
+    /// The planes of faces that cross it, each with its body.
+    faces: SmallVec<[(u16, Plane); 8]>,
+    /// The edges of the target.
+    outline: SmallVec<[Line; 6]>,
+    /// Those that were met.
+    sides: Vec<Side>,
+    /// Polygons on their way through the cuts; kept to be used again.
+    scratch: [Vec<Loop>; 2],
+}
+
+impl Sides {
+    pub fn new(region: &[DVec3], bodies: &[Body], setting: Setting) -> Sides {
+        let faces = bodies
+            .iter()
+            .enumerate()
+            .flat_map(|(k, body)| body.faces(setting).map(move |face| (k as u16, (face.normal, face.offset))));
+        let faces = faces.filter(|(_, plane)| is_crossed(region, *plane, 0.0)).collect();
+        let target = setting.target;
+        let outline = (0..target.len()).map(|i| Line::new([target[i], target[(i + 1) % target.len()]])).collect();
+        Sides { region: region.into(), faces, outline, sides: Vec::new(), scratch: Default::default() }
+    }
+
+    /// The bodies as seen from a side, in their order.
+    pub fn seen(&self, side: u16) -> &[Seen] {
+        &self.sides[side as usize].seen
+    }
+
+    /// Cuts a convex polygon of a size (m) in the region by the planes of faces that cross it, and then where edges of
+    /// bodies meet parallel ones.
+    pub fn cut(&mut self, from: &[DVec3], size: f64, bodies: &[Body], setting: Setting) -> SmallVec<[Piece; 4]> {
+        let [mut pieces, mut parts] = std::mem::take(&mut self.scratch);
+        pieces.push(from.into());
+        for (_, face) in &self.faces {
+            cut(&mut pieces, *face, size);
+        }
+        let mut found = SmallVec::new();
+        for piece in pieces.drain(..) {
+            let number = self.side(&piece, size, bodies, setting);
+            let meetings = &self.sides[number].meetings;
+            let crossing = meetings.iter().filter(|meeting| meeting.crosses(&piece, size));
+            let planes: SmallVec<[Plane; 16]> = crossing.map(|meeting| meeting.plane).collect();
+            parts.push(piece);
+            for plane in planes {
+                cut(&mut parts, plane, size);
+            }
+            let frames = parts.iter().flat_map(|part| Frame::of(part));
+            found.extend(frames.map(|frame| Piece { frame, side: number as u16 }));
+            parts.clear();
+        }
+        self.scratch = [pieces, parts];
+        found
+    }
+
+    /// The side that a piece lies on.
+    fn side(&mut self, piece: &[DVec3], size: f64, bodies: &[Body], setting: Setting) -> usize {
+        let centre = piece.iter().sum::<DVec3>() / piece.len() as f64;
+        let sign = |(_, plane): &(u16, Plane)| match is_crossed(piece, *plane, size) {
+            true => 0,
+            false if plane.0.dot(centre) > plane.1 => 1,
+            false => -1,
+        };
+        let signs: Signs = self.faces.iter().map(sign).collect();
+        if let Some(known) = self.sides.iter().position(|side| side.signs == signs) {
+            return known;
+        }
+        let is_varying =
+            |body: usize| self.faces.iter().zip(&signs).any(|(face, sign)| face.0 as usize == body && *sign == 0);
+        let seen = |(k, body): (usize, &Body)| match Occluder::new(*body, setting, centre) {
+            _ if is_varying(k) => Seen::Varying,
+            Some(occluder) => occluder.before(&self.region, setting).map_or(Seen::Nothing, Seen::As),
+            None => Seen::Nothing,
+        };
+        let seen: Vec<Seen> = bodies.iter().enumerate().map(seen).collect();
+        let meetings = meetings(&self.region, &seen, &self.outline);
+        self.sides.push(Side { signs, seen, meetings });
+        self.sides.len() - 1
+    }
+}
+
+/// Where edges of bodies meet the target's as seen from a region, and those of other bodies while they are few.
+fn meetings(region: &[DVec3], seen: &[Seen], outline: &[Line]) -> Vec<Meeting> {
+    let mut meetings = Vec::new();
+    let mut add = |edge: &Line, other: &Line| {
+        meetings.extend(Meeting::new(edge, other).filter(|meeting| is_crossed(region, meeting.plane, 0.0)));
+    };
+    for (k, occluder) in seen.iter().enumerate() {
+        let before = if seen.len() <= FEW { &seen[..k] } else { &[] };
         for edge in occluder.edges() {
-            planes.extend(outline.iter().filter_map(|other| meeting(piece, edge, other, size)));
-            planes.extend(
-                others().filter_map(|other| {
-                    meeting(piece, edge, other, size).or_else(|| meeting(piece, other, edge, size))
-                }),
-            );
+            outline.iter().for_each(|other| add(edge, other));
+            for other in before.iter().flat_map(Seen::edges) {
+                add(edge, other);
+                add(other, edge);
+            }
         }
     }
-    planes
+    meetings
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view_factors::panel::Panel;
     use crate::view_factors::solid::{Obstacles, find_solids};
 
     fn square(z: f64, low: f64, high: f64) -> Vec<DVec3> {
@@ -190,9 +256,11 @@ mod tests {
         let target = square(1.0, 0.0, 1.0);
         let obstacles = Obstacles { panels: &[], solids: &[] };
         let setting = Setting { panels: &[&plate], obstacles, target: &target, touch: 1e-9 };
-        let Sides { pieces, sides } = sides(&square(0.0, 0.0, 1.0), 1.0, &[Body::Panel(0)], setting);
+        let (region, bodies) = (square(0.0, -1.0, 2.0), [Body::Panel(0)]);
+        let mut sides = Sides::new(&region, &bodies, setting);
+        let pieces = sides.cut(&square(0.0, 0.0, 1.0), 1.0, &bodies, setting);
         // 2 · 0.4 − 0 = 0.8 and 2 · 0.7 − 1 = 0.4 lie on it; 2 · 0.4 − 1 and 2 · 0.7 do not.
-        assert_eq!((pieces.len(), sides.len()), (9, 1));
+        assert_eq!((pieces.len(), sides.sides.len()), (9, 1));
         let area: f64 = pieces.iter().map(|piece| piece.frame.area()).sum();
         assert!((area - 1.0).abs() < 1e-12);
         let corners = pieces.iter().flat_map(|piece| piece.frame.corners());
@@ -220,7 +288,12 @@ mod tests {
         let seen = |place: [f64; 3]| Occluder::new(Body::Solid(0), setting, DVec3::from_array(place)).unwrap();
         assert_eq!((seen([2.0, 2.0, 2.0]).edges.len(), seen([2.0, 2.0, 2.0]).faces.len()), (6, 3));
         assert_eq!((seen([0.5, 0.5, 2.0]).edges.len(), seen([0.5, 0.5, 2.0]).faces.len()), (4, 1));
-        let found = sides(&square(2.0, 0.25, 1.75), 1.0, &[Body::Solid(0)], setting);
-        assert_eq!(found.sides.len(), 4);
+        let (from, bodies) = (square(2.0, 0.25, 1.75), [Body::Solid(0)]);
+        let mut sides = Sides::new(&from, &bodies, setting);
+        sides.cut(&from, 1.0, &bodies, setting);
+        assert_eq!(sides.sides.len(), 4);
+        // Half of it lies on the same sides.
+        sides.cut(&square(2.0, 0.25, 1.25), 1.0, &bodies, setting);
+        assert_eq!(sides.sides.len(), 4);
     }
 }

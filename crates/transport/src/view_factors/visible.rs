@@ -197,14 +197,14 @@ enum Within {
 fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
     // Planes that cut and corners that lie outside, as bits.
     let (mut cuts, mut outside, mut first) = (0u64, 0u64, None);
-    clip.heights.clear();
+    clip.heights.resize(polygon.len(), 0.0);
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
-        let start = clip.heights.len();
-        for p in polygon {
+        for (height, p) in clip.heights.iter_mut().zip(polygon) {
             let h = normal.dot(*p) - offset;
-            (low, high) = (low.min(h), high.max(h));
-            clip.heights.push(h);
+            low = if h < low { h } else { low };
+            high = if h > high { h } else { high };
+            *height = h;
         }
         let reach = ROUNDING * high.max(-low);
         if high <= reach {
@@ -213,10 +213,11 @@ fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
         if low < -reach {
             if first.is_none() {
                 first = Some(k);
-                keep(polygon, &clip.heights[start..], reach, &mut clip.part);
+                clip.part.clear();
+                keep(polygon, clip.heights.iter().copied(), reach, |p| clip.part.push(p));
             }
             cuts |= 1 << k.min(63);
-            for (i, h) in clip.heights[start..].iter().enumerate() {
+            for (i, h) in clip.heights.iter().enumerate() {
                 outside |= u64::from(*h < -reach) << (i % 32);
             }
         }
@@ -235,34 +236,41 @@ impl Clip {
     fn keep_above(&mut self, normal: DVec3, offset: f64) -> bool {
         self.heights.clear();
         self.heights.extend(self.part.iter().map(|p| normal.dot(*p) - offset));
-        let Some(reach) = reach(&self.heights) else { return false };
+        let Some(reach) = reach(self.heights.iter().copied()) else { return false };
         if self.heights.iter().all(|h| *h >= -reach) {
             return true;
         }
-        keep(&self.part, &self.heights, reach, &mut self.next);
+        self.next.clear();
+        keep(&self.part, self.heights.iter().copied(), reach, |p| self.next.push(p));
         std::mem::swap(&mut self.part, &mut self.next);
         self.part.len() >= 3
     }
 }
 
 /// Heights that count as none; `None` if none is above it.
-fn reach(heights: &[f64]) -> Option<f64> {
-    let (low, high) = heights.iter().fold((0.0f64, 0.0f64), |(low, high), h| (low.min(*h), high.max(*h)));
+#[inline]
+fn reach(heights: impl Iterator<Item = f64>) -> Option<f64> {
+    let (low, high) = heights.fold((0.0f64, 0.0f64), |(low, high), h| (low.min(h), high.max(h)));
     let reach = ROUNDING * high.max(-low);
     (high > reach).then_some(reach)
 }
 
 /// What of a polygon is not below a plane, by the heights of its corners; `reach` counts as none.
-fn keep(polygon: &[DVec3], heights: &[f64], reach: f64, kept: &mut Vec<DVec3>) {
-    kept.clear();
-    let n = polygon.len();
-    let (mut p, mut h) = (polygon[n - 1], heights[n - 1]);
-    for (&next, &height) in polygon.iter().zip(heights) {
+#[inline]
+fn keep(
+    polygon: &[DVec3],
+    heights: impl DoubleEndedIterator<Item = f64> + Clone,
+    reach: f64,
+    mut kept: impl FnMut(DVec3),
+) {
+    let (Some(&last), Some(height)) = (polygon.last(), heights.clone().next_back()) else { return };
+    let (mut p, mut h) = (last, height);
+    for (&next, height) in polygon.iter().zip(heights) {
         if (h > reach && height < -reach) || (h < -reach && height > reach) {
-            kept.push(p + h / (h - height) * (next - p));
+            kept(p + h / (h - height) * (next - p));
         }
         if height >= -reach {
-            kept.push(next);
+            kept(next);
         }
         (p, h) = (next, height);
     }
@@ -270,13 +278,29 @@ fn keep(polygon: &[DVec3], heights: &[f64], reach: f64, kept: &mut Vec<DVec3>) {
 
 /// Cuts off what lies below a plane; whether anything is left.
 pub fn keep_above(polygon: &mut Loop, normal: DVec3, offset: f64) -> bool {
-    let heights: SmallVec<[f64; 16]> = polygon.iter().map(|p| normal.dot(*p) - offset).collect();
-    let Some(reach) = reach(&heights) else { return false };
-    if heights.iter().all(|h| *h >= -reach) {
-        return true;
+    let mut kept = Loop::new();
+    {
+        let heights = polygon.iter().map(|p| normal.dot(*p) - offset);
+        let Some(reach) = reach(heights.clone()) else { return false };
+        if heights.clone().all(|h| h >= -reach) {
+            return true;
+        }
+        keep(polygon, heights, reach, |p| kept.push(p));
     }
-    let mut kept = Vec::with_capacity(polygon.len() + 2);
-    keep(polygon, &heights, reach, &mut kept);
-    *polygon = Loop::from_slice(&kept);
+    *polygon = kept;
     polygon.len() >= 3
+}
+
+/// Cuts off what lies below a plane and answers with it, if there is something on both sides.
+pub fn cut_off(polygon: &mut Loop, normal: DVec3, offset: f64) -> Option<Loop> {
+    let (mut above, mut below) = (Loop::new(), Loop::new());
+    let heights = polygon.iter().map(|p| normal.dot(*p) - offset);
+    let depths = heights.clone().map(|h| -h);
+    keep(polygon, heights.clone(), reach(heights)?, |p| above.push(p));
+    keep(polygon, depths.clone(), reach(depths)?, |p| below.push(p));
+    if above.len() < 3 || below.len() < 3 {
+        return None;
+    }
+    *polygon = above;
+    Some(below)
 }

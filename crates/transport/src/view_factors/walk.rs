@@ -1,0 +1,267 @@
+//! The walk of one block of parts through the tree: pairs are judged in clusters, then leaf by leaf, then by a leaf and a
+//! part, and one by one only where something may stand between these.
+
+use super::body::Setting;
+use super::cell::{List as Places, Sights};
+use super::clear::{Exchange, clear};
+use super::cluster::{Cluster, Clusters};
+use super::mixed::{Stage, above, distance};
+use super::panel::Panel;
+use super::part::Part;
+use super::shaft::{Look, Shaft, Stands};
+use super::solid::{Obstacles, Solid, looks_away};
+use super::store::Entry;
+use super::visible::Shadows;
+use super::{Choices, ViewFactorOptions};
+
+use glam::DVec3;
+use radiosity_scene::Enclosure;
+use smallvec::SmallVec;
+use std::ops::Range;
+
+/// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
+const WHOLE: f64 = 0.05;
+
+/// Least share of the accuracy that a pair of facets is asked for, where surfaces have many: their errors hardly add
+/// up.
+const LEAST: f64 = 0.1;
+
+/// Panels, by index.
+type List = SmallVec<[u32; 16]>;
+
+/// What light goes from or to: a cluster or a part.
+#[derive(Clone, Copy)]
+struct End<'a> {
+    /// Corners of a convex hull.
+    corners: &'a [DVec3],
+    /// Normal and offset of the plane it lies in.
+    plane: Option<(DVec3, f64)>,
+}
+
+impl<'a> End<'a> {
+    fn of_part(part: &'a Part) -> End<'a> {
+        let normal = part.shape.normal();
+        End { corners: part.shape.corners(), plane: Some((normal, normal.dot(part.shape.corners()[0]))) }
+    }
+
+    fn of_cluster(cluster: &'a Cluster) -> End<'a> {
+        End { corners: &cluster.hull, plane: cluster.plane }
+    }
+
+    /// Least and greatest height of places above its plane; no bounds if it does not lie in one.
+    fn heights(&self, places: &[DVec3]) -> [f64; 2] {
+        let Some((normal, offset)) = self.plane else { return [f64::NEG_INFINITY, f64::INFINITY] };
+        let heights = places.iter().map(|p| normal.dot(*p) - offset);
+        heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| [low.min(h), high.max(h)])
+    }
+}
+
+/// How two ends face each other.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Facing {
+    /// One is behind the other.
+    Away,
+    /// The plane of one may cross the other.
+    Partly,
+    Whole,
+}
+
+impl Facing {
+    fn of([a, b]: [End; 2], touch: f64) -> Facing {
+        let ([low, high], [low_a, high_a]) = (a.heights(b.corners), b.heights(a.corners));
+        match (high.min(high_a), low.min(low_a)) {
+            (high, _) if high <= touch => Facing::Away,
+            (_, low) if low < -touch => Facing::Partly,
+            _ => Facing::Whole,
+        }
+    }
+}
+
+/// One block of parts on its way through the tree.
+pub struct Walk<'a> {
+    pub enclosure: &'a Enclosure,
+    /// Areas of the surfaces, m².
+    pub areas: &'a [f64],
+    pub clusters: &'a Clusters,
+    pub panels: &'a [Panel],
+    pub solids: &'a [Solid],
+    pub options: &'a ViewFactorOptions,
+    pub touch: f64,
+    pub shadows: Shadows,
+    pub sights: Sights,
+    pub choices: Choices,
+    pub entries: Vec<Entry>,
+}
+
+/// What the parts of a leaf look at.
+struct Target<'a> {
+    inner: &'a Part,
+    facing: Facing,
+    /// What may stand before it; of solids the faces that look towards the leaf.
+    panels: &'a [&'a Panel],
+    /// None if nothing does, or too little of it is seen to tell how much.
+    stage: Option<Stage<'a>>,
+}
+
+impl<'a> Walk<'a> {
+    /// All pairs of parts of `a` with later ones of `b`, past the panels `between`.
+    pub fn visit(&mut self, a: u32, b: u32, between: &[u32]) {
+        let clusters = self.clusters;
+        let (from, to) = (&clusters.nodes[a as usize], &clusters.nodes[b as usize]);
+        // Every pair once: the second part comes after the first.
+        if to.parts.end <= from.parts.start + 1 {
+            return;
+        }
+        let pairs = || pairs(from.parts.clone(), to.parts.clone());
+        let ends = [from, to].map(End::of_cluster);
+        if Facing::of(ends, self.touch) == Facing::Away {
+            self.choices.facing_away += pairs();
+            return;
+        }
+        let are_leaves = from.halves.is_none() && to.halves.is_none();
+        let Some(left) = self.standing(ends, between, if are_leaves { Look::Close } else { Look::Rough }) else {
+            self.choices.blocked += pairs();
+            return;
+        };
+        match (from.halves, to.halves) {
+            (None, None) => self.leaves([from, to], &left),
+            (Some(halves), other) if other.is_none() || from.extent > to.extent => {
+                halves.into_iter().for_each(|half| self.visit(half, b, &left));
+            }
+            (_, Some(halves)) => halves.into_iter().for_each(|half| self.visit(a, half, &left)),
+            (Some(_), None) => {}
+        }
+    }
+
+    /// The panels of a list that may stand between two ends; none if one hides all.
+    fn standing(&self, ends: [End; 2], between: &[u32], look: Look) -> Option<List> {
+        let normals = ends.map(|end| end.plane.map_or(DVec3::ZERO, |(normal, _)| normal));
+        let mut shaft = Shaft::new(ends.map(|end| end.corners), normals, self.touch);
+        let mut left = List::new();
+        for &panel in between {
+            let standing = &self.panels[panel as usize];
+            if ends.iter().any(|end| end.heights(&standing.corners)[1] <= self.touch) {
+                continue;
+            }
+            match shaft.stands(standing, look) {
+                Stands::Aside => {}
+                Stands::Between => left.push(panel),
+                Stands::Across => return None,
+            }
+        }
+        Some(left)
+    }
+
+    /// All pairs between two leaves. Those of a leaf with itself are done: it lies in a plane.
+    fn leaves(&mut self, leaves: [&'a Cluster; 2], between: &[u32]) {
+        let distance = |leaf: &Cluster| {
+            let middle = leaf.hull.iter().sum::<DVec3>() / leaf.hull.len() as f64;
+            let panels = between.iter().map(|panel| &self.panels[*panel as usize]);
+            distance(middle, panels) / self.clusters.parts[leaf.parts.start].radius
+        };
+        let is_turned = !between.is_empty() && distance(leaves[0]) < distance(leaves[1]);
+        let [outer, inner] = if is_turned { [leaves[1], leaves[0]] } else { leaves };
+        for target in inner.parts.clone() {
+            self.target(outer, target, between);
+        }
+    }
+
+    /// All pairs of a leaf with one part.
+    fn target(&mut self, outer: &'a Cluster, target: usize, between: &[u32]) {
+        let clusters = self.clusters;
+        let inner = &clusters.parts[target];
+        let ends = [End::of_cluster(outer), End::of_part(inner)];
+        let facing = Facing::of(ends, self.touch);
+        if facing == Facing::Away {
+            self.choices.facing_away += outer.parts.len();
+            return;
+        }
+        let left = if between.is_empty() { Some(List::new()) } else { self.standing(ends, between, Look::Close) };
+        let Some(between) = left else {
+            self.choices.blocked += outer.parts.len();
+            return;
+        };
+        let mut target = Target { inner, facing, panels: &[], stage: None };
+        if between.is_empty() {
+            outer.parts.clone().for_each(|part| self.pair(part, &mut target));
+            return;
+        }
+        let obstacles = Obstacles { panels: self.panels, solids: self.solids };
+        let first = End::of_part(&clusters.parts[outer.parts.start]);
+        let (region, shape) = (above(&outer.hull, ends[1].plane), above(inner.shape.corners(), first.plane));
+        let from = region.as_deref().unwrap_or(&outer.hull);
+        let panels = between.iter().map(|panel| &self.panels[*panel as usize]);
+        let panels: SmallVec<[&Panel; 16]> =
+            panels.filter(|panel| !looks_away(panel, obstacles, from, self.touch)).collect();
+        target.panels = &panels;
+        if let (Some(shape), Some((normal, _))) = (&shape, first.plane) {
+            let setting = Setting { panels: &panels, obstacles, target: shape, touch: self.touch };
+            target.stage = Stage::new(from, normal, inner, setting, &mut self.sights);
+        }
+        outer.parts.clone().for_each(|part| self.pair(part, &mut target));
+    }
+
+    /// Error of A_i F_ij that two parts may have: their share of what their surfaces may, m².
+    fn tolerance(&self, a: &Part, b: &Part) -> f64 {
+        let (area, other) = (a.shape.area(), b.shape.area());
+        let [i, j] = [a, b].map(|part| self.enclosure.surface_of[part.facet as usize]);
+        let of_surface = self.areas[i as usize].max(self.areas[j as usize]);
+        let times = if i == j { 2.0 } else { 1.0 };
+        self.options.accuracy * (area * other / (times * of_surface)).max(LEAST * area.min(other))
+    }
+
+    /// A part and what it looks at.
+    fn pair(&mut self, part: usize, target: &mut Target) {
+        let (a, b) = (&self.clusters.parts[part], target.inner);
+        let ends = [a, b].map(End::of_part);
+        let facing = if target.facing == Facing::Partly { Facing::of(ends, self.touch) } else { target.facing };
+        if facing == Facing::Away {
+            self.choices.facing_away += 1;
+            return;
+        }
+        let mut list = Places::new();
+        if !target.panels.is_empty() {
+            let mut shaft = Shaft::new(ends.map(|end| end.corners), [a, b].map(|part| part.shape.normal()), self.touch);
+            for (k, panel) in target.panels.iter().enumerate() {
+                if ends.iter().any(|end| end.heights(&panel.corners)[1] <= self.touch) {
+                    continue;
+                }
+                match shaft.stands(panel, Look::Close) {
+                    Stands::Aside => {}
+                    Stands::Between => list.push(k as u16),
+                    Stands::Across => {
+                        self.choices.blocked += 1;
+                        return;
+                    }
+                }
+            }
+        }
+        let least = a.shape.area().min(b.shape.area());
+        let tolerance = self.tolerance(a, b);
+        // Past panels the whole is asked for little more exactly than what is left of it.
+        let of_whole = if list.is_empty() { self.options.clear_accuracy * least } else { WHOLE * tolerance };
+        let (whole, order) = clear(a, b, of_whole, facing == Facing::Partly);
+        let exchange = if list.is_empty() {
+            match order {
+                0 => self.choices.clear_closed_form += 1,
+                order => self.choices.clear_cubature[order - 1] += 1,
+            }
+            whole
+        } else {
+            self.choices.clipped += 1;
+            let tolerance = (tolerance - whole.error).max(0.5 * tolerance);
+            let scratch = (&mut self.shadows, &mut self.sights);
+            let found = target.stage.as_mut().and_then(|stage| stage.mixed(scratch, a, &list, whole, tolerance));
+            // Too thin a strip sees the other, or too much stands between for a list.
+            found.unwrap_or(Exchange { value: 0.5 * whole.value, error: 0.5 * whole.value + whole.error })
+        };
+        if exchange.value > 0.0 || exchange.error > 0.0 {
+            self.entries.push(Entry::new(a.facet, b.facet, exchange));
+        }
+    }
+}
+
+/// Pairs (i, j) with i < j from two ranges, of which the first is not after the second.
+fn pairs(from: Range<usize>, to: Range<usize>) -> usize {
+    from.map(|i| to.end.saturating_sub(to.start.max(i + 1))).sum()
+}
