@@ -7,7 +7,7 @@ use crate::input::PictureArguments;
 use crate::output::write_now;
 use crate::progress::Progress;
 use crate::{Failure, views};
-use radiosity::{Camera, Glimpse, Monitor, Solution, SolveOptions, Tracer};
+use radiosity::{Camera, Glimpse, Monitor, Picture, Solution, SolveOptions, Tracer};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -83,6 +83,8 @@ impl<'a> Frames<'a> {
         let (Some(folder), Some(camera)) = (&asked.frames, camera) else { return Ok(None) };
         progress.part("first pictures");
         let frames = Frames::new((folder, asked), (tracer, camera), progress);
+        let picture = frames.glimpse.first(tracer, options, progress)?;
+        frames.put(&mut frames.lock(), &picture, None);
         radiosity::preview(tracer, options, &frames)?;
         progress.parts();
         Ok(Some(frames))
@@ -98,12 +100,30 @@ impl<'a> Frames<'a> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn write(&self, solution: &Solution, number: usize) -> Result<PathBuf, Failure> {
-        let picture = self.glimpse.picture(solution);
-        let png = views::png(&picture, self.exposure.unwrap_or_else(|| picture.exposure()))?;
+    fn write(&self, picture: &Picture, number: usize) -> Result<PathBuf, Failure> {
+        let png = views::png(picture, self.exposure.unwrap_or_else(|| picture.exposure()))?;
         let path = self.folder.join(name(number));
         write_now(&path, &png)?;
         Ok(path)
+    }
+
+    /// Writes a picture, of a solution or the first, and tells of it.
+    fn put(&self, state: &mut State, picture: &Picture, of: Option<&Solution>) {
+        match self.write(picture, state.count) {
+            Ok(path) => {
+                let seconds = self.progress.seconds();
+                let (rays, elements) = (of.map_or(0, Solution::rays), of.map(|solution| solution.elements.len()));
+                self.progress.event(&json!({
+                    "event": "frame", "output": path, "rays": rays, "elements": elements, "seconds": seconds,
+                }));
+                if state.first.is_none() {
+                    self.progress.line(&format!("first picture after {seconds:.2} s: {}", path.display()));
+                }
+                state.first.get_or_insert(seconds);
+                state.count += 1;
+            }
+            Err(failure) => state.failure = Some(failure),
+        }
     }
 }
 
@@ -134,24 +154,11 @@ impl Monitor for Frames<'_> {
 
     fn solved(&self, solution: &Solution) {
         let mut state = self.lock();
-        // The answer begins anew without rays: its first picture is older than those that are there.
-        if state.failure.is_some() || (state.count > 0 && solution.rays() == 0) {
+        // The answer begins anew without rays: its first picture is older than those that are there. Of the coarse solutions'
+        // only that of all elements is better than the picture before.
+        if state.failure.is_some() || (state.count > 1 && solution.rays() == 0) {
             return;
         }
-        match self.write(solution, state.count) {
-            Ok(path) => {
-                let seconds = self.progress.seconds();
-                let (rays, elements) = (solution.rays(), solution.elements.len());
-                self.progress.event(&json!({
-                    "event": "frame", "output": path, "rays": rays, "elements": elements, "seconds": seconds,
-                }));
-                if state.first.is_none() {
-                    self.progress.line(&format!("first picture after {seconds:.2} s: {}", path.display()));
-                }
-                state.first.get_or_insert(seconds);
-                state.count += 1;
-            }
-            Err(failure) => state.failure = Some(failure),
-        }
+        self.put(&mut state, &self.glimpse.picture(solution), Some(solution));
     }
 }

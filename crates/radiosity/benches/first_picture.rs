@@ -39,10 +39,16 @@ fn measure(name: &str, scene: &Scene) {
         let glimpse = Glimpse::new(&tracer, &camera, SIZE[0], SIZE[1]);
         let cast = start.elapsed().as_secs_f64();
         let watch = Watch { start, glimpse: &glimpse, times: Mutex::default() };
+        let picture = glimpse.first(&tracer, &SolveOptions::default(), &watch).expect("nobody stops it");
+        assert!(picture.exposure().is_finite());
+        let first = start.elapsed().as_secs_f64();
         preview(&tracer, &SolveOptions::default(), &watch).expect("nobody stops it");
         let times = watch.times.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
-        let (_, elements, first) = times[0];
-        print!("{name:>24} {elements:>7} elements: seen {cast:.2} s, first picture {first:.2} s; by rays per cell");
+        let (_, elements, whole) = times[0];
+        print!(
+            "{name:>24} {elements:>7} elements: seen {cast:.2} s, first picture {first:.2} s, of all elements {whole:.2} s; "
+        );
+        print!("by rays per cell");
         times[1..].iter().for_each(|(rays, _, seconds)| print!(" {rays}: {seconds:.2} s"));
         println!();
     }

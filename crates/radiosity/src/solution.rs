@@ -210,7 +210,7 @@ impl<'a> Solution<'a> {
         Ok(solution)
     }
 
-    /// The first picture, before any row is traced: elements, their direct light, and for the rest the ambient term
+    /// A first answer, before any row is traced: elements, their direct light, and for the rest the ambient term
     /// (Cohen et al. 1988, sect. 4.2), the same indirect irradiance everywhere that keeps the energy. Sky light comes with
     /// the rows. Call [`Solution::refine`] with ever more rays for ever better answers; each is whole.
     ///
@@ -638,7 +638,7 @@ fn memory_error(elements: usize, needed: usize, options: &SolveOptions) -> Error
 }
 
 /// Width of a cell: as asked, or such that the scene's area makes as many as asked.
-fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
+pub(crate) fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
     options.element_size.unwrap_or_else(|| (2.0 * area(tracer) / options.cells.max(1) as f64).sqrt())
 }
 
