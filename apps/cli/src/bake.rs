@@ -25,7 +25,8 @@ pub struct Arguments {
     /// OpenEXR as well, OUT.lightmap0.exr and so on (lx).
     #[arg(short, long, value_name = "OUT.glb")]
     output: Option<PathBuf>,
-    /// Texels per metre of the lightmap; by default about 200 000 texels in all, and up to 4 million where --error needs them.
+    /// Texels per metre of the lightmap; by default about 200 000 texels in all, or four for each chart, and up to
+    /// twenty times as many where --error needs them.
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with_all = ["vertices", "unlit"],
         value_parser = numbers::positive)]
     texels_per_metre: Option<f64>,

@@ -2,7 +2,7 @@
 
 use crate::answer::Station;
 use crate::field::SMOOTHING;
-use crate::lightmap::AUTOMATIC_TEXELS;
+use crate::lightmap::automatic_texels;
 use crate::measure::{ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
@@ -26,8 +26,9 @@ const FEWEST_RAYS: usize = 256;
 /// Gathers, each with twice the rays of the one before, that are tried whatever they cost before all is made finer.
 pub(crate) const GATHERS: usize = 3;
 
-/// Rays of the gathers of a lightmap, of as many texels as it has where no error asks for more, up to which more are tried,
-/// relative to those of the solution: to make all finer takes at least as many again.
+/// Rays of the gathers of a lightmap, of as many texels as it has where no error asks for more (a chart has two triangles or
+/// more, most often), up to which more are tried, relative to those of the solution: to make all finer takes at least as
+/// many again.
 const SOLUTIONS: f64 = 2.0;
 
 /// Rays of the first gather.
@@ -120,7 +121,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut auditor = Auditor::new(tracer, watched.iter().map(|s| s.place).collect(), options.seed);
     let mut rounds = Vec::new();
     loop {
-        let received = solution.received(monitor)?;
+        // Elements that are only looked up make no field: a picture gathers for those that it shows.
+        let received = if solve.looked_up { solution.indirect_halves() } else { solution.received(monitor)? };
         let field = solution.field_of(&received);
         let mut read = |gather: usize| {
             let indirect = if gather == 0 { Indirect::Field(&field) } else { Indirect::Gather { rays: gather } };
@@ -130,11 +132,11 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             Ok::<_, Error>((audit, gather, light))
         };
         // The field does not know contacts below the size of its elements: gathering at each point does, and costs less
-        // than elements that small. Elements that are only looked up make no field.
+        // than elements that small.
         let mut rays = gather_rays(options.error);
         let (mut audit, mut gather, mut light) = read(if solve.looked_up { rays } else { 0 })?;
         rays <<= usize::from(solve.looked_up);
-        let affordable = SOLUTIONS * (solution.elements.len() * solution.rays()) as f64 / AUTOMATIC_TEXELS;
+        let affordable = SOLUTIONS * solution.rays_in_all() / automatic_texels(tracer.mesh.triangles.len() / 2);
         for doublings in 0.. {
             let is_dear = doublings >= GATHERS && rays as f64 > affordable;
             if is_dear || audit.upper <= options.error || is_over(monitor) {

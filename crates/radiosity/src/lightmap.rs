@@ -66,18 +66,23 @@ pub const TEXEL_BYTES: usize = 400;
 
 /// Texels that the program spends where no density is asked for, and how many for each chart where that is more: the corners of
 /// a rectangle.
-pub(crate) const AUTOMATIC_TEXELS: f64 = 200_000.0;
+const AUTOMATIC_TEXELS: f64 = 200_000.0;
 const CHART_TEXELS: f64 = 4.0;
 
-/// Most texels that are spent for an error, relative to those at first: more than a page of 2048 × 2048 is no lightmap for a
-/// room any more.
-const MOST_TEXELS: f64 = 20.0;
+/// How many times as many texels are spent for an error at most: more than a page of 2048 × 2048 is no lightmap for a room any
+/// more.
+const MOST_GROWTH: f64 = 20.0;
 
-/// Most texels that are lit in a round, relative to those that are lit anyway: it takes three times as long then.
+/// How many times as many texels as at first are lit in a round at most: it takes as many times as long then.
 const MOST_LIT: f64 = 3.0;
 
 /// Rounds after the first map: two or three of finer texels, one to mend what the estimate had wrong.
 const ROUNDS: usize = 4;
+
+/// Texels of so many charts where no density is asked for.
+pub(crate) fn automatic_texels(charts: usize) -> f64 {
+    AUTOMATIC_TEXELS.max(CHART_TEXELS * charts as f64)
+}
 
 /// A vertex of a primitive: its slot, source corners, weights and texture coordinates, the floats by their bits.
 type VertexKey = (usize, [u32; 3], [u32; 3], [u32; 2]);
@@ -97,7 +102,7 @@ pub fn lightmap(
     monitor.stage("unwrap");
     let mut canvas = Canvas::new(&baked.solution, &params)?;
     let most = (baked.solution.memory_allowed() / TEXEL_BYTES) as f64;
-    let budget = AUTOMATIC_TEXELS.max(CHART_TEXELS * canvas.charts.len() as f64).min(most);
+    let budget = automatic_texels(canvas.charts.len()).min(most);
     params.texels_per_metre =
         texels_per_metre.or_else(|| canvas.charts.density_for(budget)).unwrap_or(params.texels_per_metre);
     let texels = canvas.charts.texel_count(params.texels_per_metre);
@@ -119,7 +124,7 @@ pub fn lightmap(
         let whole = allot(goal.left);
         needed = whole.as_ref().map(|whole| whole.texels);
         // A map that cannot reach it is not begun.
-        if whole.is_none_or(|whole| whole.texels > most.min(MOST_TEXELS * budget)) {
+        if whole.is_none_or(|whole| whole.texels > most.min(MOST_GROWTH * budget)) {
             break;
         }
         let lit = |step: &Allotment| if goal.relight { step.texels } else { step.rough };

@@ -1,8 +1,9 @@
-//! How far surfaces see: the scale of a scene's rooms, whatever its size.
+//! How far surfaces see: the scale of a scene's rooms, whatever its size, and how many cells it takes.
 
+use crate::{Solution, SolveOptions};
 use glam::DVec2;
-use radiosity_scene::Side;
 use radiosity_scene::elements::triangle_from_square;
+use radiosity_scene::{Mesh, Side};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
@@ -13,9 +14,30 @@ const RAYS: u32 = 8192;
 /// The stream of sample points that they use.
 const PATHS: u32 = 0x0d15;
 
+/// Most cells that a scene of many rooms is given without being asked.
+const MOST_CELLS: usize = 1_000_000;
+
+impl SolveOptions {
+    /// More cells where rooms are many: so many along the mean path of light at least, up to a million and what the memory
+    /// holds. As many for all rooms together as one of them has would leave each a few.
+    pub(crate) fn cells_on_path(&mut self, tracer: &Tracer, count: f64) {
+        let size = mean_path(tracer) / count;
+        let mut wanted = ((2.0 * area(tracer.mesh) / (size * size)) as usize).min(MOST_CELLS);
+        while wanted > self.cells && Solution::memory(tracer, &SolveOptions { cells: wanted, ..*self }) > self.memory {
+            wanted /= 2;
+        }
+        self.cells = self.cells.max(wanted);
+    }
+}
+
+/// Area of all triangles, m².
+pub(crate) fn area(mesh: &Mesh) -> f64 {
+    (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum()
+}
+
 /// Mean distance from a place on a surface to what it sees, metres: 4 V/A in an empty room of volume V and area A (the mean
 /// chord). Rays that leave the scene, and those within solids, do not count; infinite where there are no others.
-pub(crate) fn mean_path(tracer: &Tracer) -> f64 {
+fn mean_path(tracer: &Tracer) -> f64 {
     let mesh = tracer.mesh;
     let below: Vec<f64> = (0..mesh.triangles.len())
         .scan(0.0, |sum, triangle| {

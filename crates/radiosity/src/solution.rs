@@ -7,7 +7,7 @@ use crate::Error;
 use crate::displayed::{Displayed, Screen, Shown};
 use crate::division::{Optics, Sheets, divided};
 use crate::equation::{self, Matrix, RANDOM_TOLERANCE, TABLE_TOLERANCE, Task, single};
-use crate::mean_path::mean_path;
+use crate::mean_path::area;
 use crate::monitor::{Hurry, Monitor, Stages, Watch, is_over};
 use radiosity_scene::{Bands, Elements, Scene, SkyPatches};
 use radiosity_solve::{DiffuseResponse, Info, Params, Solver};
@@ -75,9 +75,6 @@ const LEAST_RAYS: usize = 32;
 /// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
 const MATRIX_CELLS: usize = 2000;
 
-/// Most cells that a scene of many rooms is given without being asked.
-const MOST_CELLS: usize = 1_000_000;
-
 /// Rays per cell that are traced whether or not there is time: a tenth of a second for a room.
 const FIRST_RAYS: usize = 16;
 
@@ -122,17 +119,6 @@ impl SolveOptions {
     fn refuse_large_matrices(&self, elements: usize) -> Result<(), Error> {
         let (solver, needed, allowed) = (self.solver, self.solver.matrix_bytes(elements), self.memory);
         if needed > allowed { Err(Error::Elimination { solver, elements, needed, allowed }) } else { Ok(()) }
-    }
-
-    /// More cells where rooms are many: so many along the mean path of light at least, up to a million and what the memory
-    /// holds. As many for all rooms together as one of them has would leave each a few.
-    pub(crate) fn cells_on_path(&mut self, tracer: &Tracer, count: f64) {
-        let size = mean_path(tracer) / count;
-        let mut wanted = ((2.0 * area(tracer) / (size * size)) as usize).min(MOST_CELLS);
-        while wanted > self.cells && Solution::memory(tracer, &SolveOptions { cells: wanted, ..*self }) > self.memory {
-            wanted /= 2;
-        }
-        self.cells = self.cells.max(wanted);
     }
 
     /// Fewer rays where the memory does not hold those that are asked for: an error that is missed tells more than none.
@@ -351,6 +337,12 @@ impl<'a> Solution<'a> {
     /// M: rays per cell; the elements of a divided cell share them.
     pub fn rays(&self) -> usize {
         self.table.columns()
+    }
+
+    /// Rays of all elements together.
+    pub(crate) fn rays_in_all(&self) -> f64 {
+        let share = |element| self.elements.share(self.tracer.mesh, element);
+        self.rays() as f64 * (0..self.elements.len() as u32).map(share).sum::<f64>()
     }
 
     /// Appends rays up to `rays` per cell and solves again from the solution so far. When the monitor's time is over, it ends
@@ -639,9 +631,5 @@ fn memory_error(elements: usize, needed: usize, options: &SolveOptions) -> Error
 
 /// Width of a cell: as asked, or such that the scene's area makes as many as asked.
 pub(crate) fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
-    options.element_size.unwrap_or_else(|| (2.0 * area(tracer) / options.cells.max(1) as f64).sqrt())
-}
-
-fn area(tracer: &Tracer) -> f64 {
-    (0..tracer.mesh.triangles.len()).map(|t| tracer.mesh.area(t)).sum()
+    options.element_size.unwrap_or_else(|| (2.0 * area(tracer.mesh) / options.cells.max(1) as f64).sqrt())
 }

@@ -239,7 +239,7 @@ impl Luminaires {
         parts.clear();
         parts.add(light, &self.lights[light], place);
         // The stream of places has no other use here.
-        let pick = || Sequence::new(seed, DIRECT).point(0)[0];
+        let pick = Sequence::new(seed, DIRECT).point(0)[0];
         let Some((part, probability)) = parts.pick(pick) else { return [0.0; 3] };
         let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
         let (e, _) = parts.irradiance(part, tracer, place, (&sequence, 0, 1), (RATIO, seed));

@@ -102,12 +102,9 @@ impl<'l> Parts<'l> {
         self.total
     }
 
-    /// One of them by its weight, with a number in [0, 1) that is asked for only if there are several; and how probable that was.
-    pub fn pick(&self, u: impl FnOnce() -> f32) -> Option<(&Part<'l>, f64)> {
-        if let [only] = &self.list[..] {
-            return Some((only, 1.0));
-        }
-        let mut rest = f64::from(u()) * self.total;
+    /// One of them by its weight, with a number in [0, 1), and how probable that was.
+    pub fn pick(&self, u: f32) -> Option<(&Part<'l>, f64)> {
+        let mut rest = f64::from(u) * self.total;
         let picked = self.list.iter().find(|part| {
             rest -= part.weight;
             rest < 0.0

@@ -189,18 +189,18 @@ fn share([visible, hidden]: [f64; 2]) -> f64 {
     if visible + hidden > 0.0 { (visible / (visible + hidden)).clamp(0.0, 1.0) } else { 0.5 }
 }
 
-/// What was seen from corners of cells: by the side and the place, on a grid that is finer than the cells of all but the
-/// narrowest pieces. Cells share corners, and so do polygons side by side.
+/// What was seen from corners of cells: by the side and the place, on a grid so fine that only rounding is forgiven. Cells
+/// share corners, and so do polygons side by side, of whatever sizes.
 #[derive(Default)]
 pub struct Sights {
-    seen: FxHashMap<(u16, [i32; 3]), Sight>,
+    seen: FxHashMap<(u16, [i64; 3]), Sight>,
     from: DVec3,
     /// Lines of the grid in a metre.
     grid: f64,
 }
 
-/// Lines of the grid along the longest edge.
-const LINES: f64 = 1e6;
+/// Lines of the grid along the extent of the region.
+const LINES: f64 = 1e10;
 
 /// Sights for which memory is kept; to clear more takes longer than to ask for it anew.
 const KEPT: usize = 1024;
@@ -217,8 +217,8 @@ impl Sights {
         self.grid = LINES / extent;
     }
 
-    fn place(&self, place: DVec3) -> [i32; 3] {
-        ((place - self.from) * self.grid).to_array().map(|x| x.round() as i32)
+    fn place(&self, place: DVec3) -> [i64; 3] {
+        ((place - self.from) * self.grid).to_array().map(|x| x.round() as i64)
     }
 }
 
