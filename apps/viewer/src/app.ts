@@ -705,10 +705,13 @@ export class App {
   setPlane(height: number, border: number): void {
     [this.planeHeight, this.planeBorder] = [height, border];
     if (this.plane) {
-      Object.assign(this.plane, { height, border });
+      // Numbers of the old plane would be taken for those of this one.
+      Object.assign(this.plane, { height, border, answer: null });
+      this.marks.plane(null);
       this.planes.begin();
     }
     this.tell('grid');
+    this.tell('view');
   }
 
   private tellPlane(answer: PlaneAnswer | null, why: string | null): void {

@@ -142,6 +142,21 @@ test('a working plane lies in the air of the room, as `measure` has it, and foll
   assert.equal(await page.locator('#legend').isVisible(), true);
   await picture(page, 'plane');
 
+  // At another height nothing of it stays; back there it is the same again.
+  const begun = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.setPlane(0.2, 0.04);
+    const { hidden } = document.querySelector('#grid .facts');
+    return [app.plane.answer, hidden, document.querySelector('#grid').innerText.includes('Measuring …')];
+  });
+  assert.deepEqual(begun, [null, true, true]);
+  await answered(edits);
+  const higher = await plane();
+  assert.ok(higher.points.length > 0 && higher.points.every(([, y]) => Math.abs(y - 0.2) < 1e-6));
+  await page.evaluate(() => window.radiosity.app.setPlane(0.1, 0.04));
+  await answered(edits);
+  assert.deepEqual((await plane()).points, laid.points);
+
   // A thing put where points were takes them away and frees others, a dimmed lamp halves what is left; undone, all is as before.
   const block = (await state(page)).objects.find(({ name }) => name === 'short block');
   await page.evaluate((id) => {
