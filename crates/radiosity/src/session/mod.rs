@@ -40,6 +40,7 @@ mod model;
 mod paint;
 mod plane;
 mod probe;
+mod rectangle;
 mod solve;
 mod state;
 

@@ -8,13 +8,15 @@
 //!
 //! Fails where walls and furniture are one object: that is a wall then. Doors wider than twice the zone let the plane through.
 
+use super::rectangle::{axes_along, cells, extent, is_within};
 use super::{ObjectId, Session};
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::live::{Body, Bounds, Target};
+use radiosity_transport::live::{Bounds, Target};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Cosine up to which a surface is level: one degree.
@@ -22,12 +24,6 @@ const LEVEL: f64 = 0.99985;
 
 /// Farthest from the plane of the picked triangle, as a share of the object's size.
 const FLAT: f64 = 1e-3;
-
-/// Largest cell of the standard, metres.
-const LARGEST: f64 = 10.0;
-
-/// Most cells: more take seconds, and nobody reads them. Halls of 100 m have 400.
-const MOST_CELLS: f64 = 4000.0;
 
 /// What rises so far above the floor is a wall, even if it could be moved; a cupboard, and no desk.
 const WALL: f64 = 2.0;
@@ -42,8 +38,9 @@ const AROUND: u32 = 32;
 /// there.
 const INSIDE: f64 = 0.4;
 
-/// Rays of a point: four times those of an element, as no neighbours average its noise out. In a room with daylight from one
-/// window points are off by 1 % then, under lamps by a tenth of that (test `agrees_with_measure`); half as many make it 1.6 times as much.
+/// Rays of a point: by default four times those of an element, as no neighbours average its noise out. In a room with daylight from
+/// one window points are off by 1 % then, under lamps by a tenth of that (test `agrees_with_measure`); half as many make it 1.6
+/// times as much.
 const RAYS: u32 = 1024;
 
 /// Shadow rays of a point, shared out among lights, and how many each has.
@@ -81,7 +78,11 @@ pub enum PlaneError {
     #[error("the picked surface is no floor: it is not level, or looks down")]
     NotLevel,
     /// Nothing is left.
-    #[error("the surface is {:.2} m × {:.2} m: nothing is left within the zone of {border} m (pick a floor, or make the zone smaller)", size[0], size[1])]
+    #[error(
+        "the surface is {:.2} m × {:.2} m: nothing is left within the zone of {border} m (pick a floor, or make the zone smaller)",
+        size[0],
+        size[1]
+    )]
     TooNarrow {
         /// Sides of the surface, metres.
         size: [f64; 2],
@@ -133,7 +134,7 @@ pub struct PlaneReading {
     pub error: f32,
 }
 
-/// A plane on its way.
+/// A plane on its way. It belongs to the session that works on it: from another's cells it would not begin anew.
 #[derive(Clone, Debug)]
 pub struct Plane {
     question: PlaneQuestion,
@@ -275,7 +276,7 @@ impl Session {
 
         let floor = origin.dot(up);
         let is_wall = |index: usize| !self.is_movable(index) || world.bodies[index].bounds.high.dot(up) > floor + WALL;
-        let mut things: std::collections::BTreeMap<u32, (Bounds, Vec<usize>)> = std::collections::BTreeMap::new();
+        let mut things: BTreeMap<u32, (Bounds, Vec<usize>)> = BTreeMap::new();
         for (index, other) in world.bodies.iter().enumerate().filter(|(_, other)| other.is_present) {
             let (bounds, bodies) =
                 things.entry(self.objects[index].group).or_insert_with(|| (other.bounds, Vec::new()));
@@ -284,7 +285,7 @@ impl Session {
             bodies.push(index);
         }
         // What is around the picked place is the room, or the house that it is in.
-        let on = picked_place(body, triangle, uv) + world.offset * normal;
+        let on = body.point(triangle, uv).2 + world.offset * normal;
         things.retain(|_, (_, bodies)| self.winding(bodies, on).abs() <= INSIDE);
         Ok(Layout {
             surface,
@@ -358,7 +359,7 @@ impl Session {
         let PlaneQuestion { object, triangle, uv, height, .. } = plane.question;
         let world = self.live.world();
         let body = &world.bodies[object.0 as usize];
-        let picked = picked_place(body, triangle, uv) - layout.origin;
+        let picked = body.point(triangle, uv).2 - layout.origin;
         let picked = DVec2::new(picked.dot(layout.axes[0]), picked.dot(layout.axes[1]));
 
         // From the nearest cell that is seen from there, over all to which no wall bars the way.
@@ -426,65 +427,5 @@ impl Session {
     }
 }
 
-/// A place on an object, about the middle of the scene.
-fn picked_place(body: &Body, triangle: u32, uv: [f32; 2]) -> DVec3 {
-    let (t, side, mut corners) = body.shape.place(triangle);
-    if side == Side::Back {
-        corners.swap(1, 2);
-    }
-    let weights = DVec2::from(uv.map(f64::from));
-    let on = corners[0] + weights.x * (corners[1] - corners[0]) + weights.y * (corners[2] - corners[0]);
-    let [a, b, c] = body.corners[t];
-    a + on.x * (b - a) + on.y * (c - a)
-}
-
 /// An object that is less than this part of the scene wide is taken for one that can be moved.
 const MOVABLE: f64 = 0.5;
-
-/// How many cells a plane with these sides has each way, and whether they are larger than the standard's.
-fn cells(size: DVec2) -> ([usize; 2], bool) {
-    let (longer, shorter) = (size.max_element(), size.min_element());
-    let d = if longer >= 2.0 * shorter { shorter } else { longer };
-    let p = (0.2 * 5f64.powf(d.log10())).min(LARGEST);
-    // What is a whole number but for rounding is that number.
-    let wanted = (size / p - 1e-9).ceil().max(DVec2::ONE);
-    let share = (MOST_CELLS / (wanted.x * wanted.y)).sqrt().min(1.0);
-    let counts = (share * wanted).floor().max(DVec2::ONE);
-    ([counts.x as usize, counts.y as usize], share < 1.0)
-}
-
-/// Axes of the smallest rectangle around a level surface that lies along an edge of it.
-fn axes_along(surface: &[[DVec3; 3]], normal: DVec3) -> [DVec3; 2] {
-    let mut tried = std::collections::BTreeSet::new();
-    let mut best = (f64::INFINITY, [DVec3::X, DVec3::Y]);
-    let sideways = normal.any_orthonormal_pair();
-    for [a, b, c] in surface {
-        for edge in [*b - *a, *c - *b, *a - *c] {
-            let u = (edge - edge.dot(normal) * normal).normalize_or_zero();
-            // Edges that are a quarter turn apart have the same rectangle, and so have nearly those that are a tenth of a degree apart.
-            let degrees = u.dot(sideways.1).atan2(u.dot(sideways.0)).to_degrees().rem_euclid(90.0);
-            if u == DVec3::ZERO || !tried.insert((10.0 * degrees) as u32) {
-                continue;
-            }
-            let axes = [u, normal.cross(u)];
-            let flat = |p: &DVec3| DVec2::new(p.dot(axes[0]), p.dot(axes[1]));
-            let [low, high] = extent(surface.iter().flatten().map(flat));
-            let area = (high - low).x * (high - low).y;
-            // By more than rounding.
-            if area < (1.0 - 1e-9) * best.0 {
-                best = (area, axes);
-            }
-        }
-    }
-    best.1
-}
-
-fn extent(points: impl Iterator<Item = DVec2>) -> [DVec2; 2] {
-    points.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
-}
-
-/// Whether a point lies in a triangle that goes round counter-clockwise.
-fn is_within(p: DVec2, [a, b, c]: &[DVec2; 3]) -> bool {
-    let sides = [(*b - *a).perp_dot(p - *a), (*c - *b).perp_dot(p - *b), (*a - *c).perp_dot(p - *c)];
-    sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
-}

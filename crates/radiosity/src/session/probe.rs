@@ -3,7 +3,6 @@
 use super::display::Weights;
 use super::model::{LightKind, Probe};
 use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session, display};
-use glam::DVec2;
 use radiosity_scene::{Bands, PointLightKind, Projection, Side, luminance};
 use radiosity_transport::live::{Chunk, Lanes};
 use std::sync::Arc;
@@ -140,8 +139,8 @@ impl Session {
 
     /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, or for
     /// [`Layer::Error`] its standard error. What rays found of it is averaged over neighbours that differ by no more than noise.
-    /// Empty for an object that there is not, and for a layer that cannot be told yet ([`Session::has_layer`]). Lights beyond the 31st share one column, and [`Layer::Light`] shows what all of
-    /// them bring.
+    /// Empty for an object that there is not, and for a layer that cannot be told yet ([`Session::has_layer`]). Lights beyond the
+    /// 31st share one column, and [`Layer::Light`] shows what all of them bring.
     pub fn light(&self, object: ObjectId, layer: Layer) -> Vec<Bands> {
         let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
         let Some(kept) = self.layer(layer) else { return Vec::new() };
@@ -344,14 +343,8 @@ impl Session {
             return None;
         }
         let id = (body.first + triangle) as usize;
-        let (t, side, mut corners) = body.shape.place(triangle);
-        if side == Side::Back {
-            corners.swap(1, 2);
-        }
-        let weights = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
-        let at = corners[0] + weights.x * (corners[1] - corners[0]) + weights.y * (corners[2] - corners[0]);
-        let [a, b, c] = body.corners[t];
-        let position = a + at.x * (b - a) + at.y * (c - a) + world.middle;
+        let (t, side, at) = body.point(triangle, uv);
+        let position = at + world.middle;
         let normal = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
 
         let of = |list: &[Lanes<4>]| list.get(id).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]]);
@@ -395,7 +388,7 @@ impl Session {
         brightest(&mut objects);
         let mut lights: Vec<(u32, Bands)> = Vec::new();
         // Lamps that are not seen yet bring nothing to what is shown.
-        for ((strand, factor), number) in self.strands.iter().zip(&self.state.factors).zip(0..) {
+        for (number, (strand, factor)) in self.strands.iter().zip(&self.state.factors).enumerate() {
             let column = self.state.columns.get(number).and_then(|column| column.get(id));
             let own = match (column, strand.column) {
                 (Some(own), _) if self.state.has_columns => *own,

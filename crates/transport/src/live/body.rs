@@ -231,6 +231,19 @@ impl Body {
         self.bounds = bounds_of(&self.corners);
     }
 
+    /// A place on an element by the weights of its corners 1 and 2, which change places on backs: triangle, side, and the point
+    /// about the middle of the scene.
+    pub fn point(&self, element: u32, uv: [f32; 2]) -> (usize, Side, DVec3) {
+        let (t, side, mut corners) = self.shape.place(element);
+        if side == Side::Back {
+            corners.swap(1, 2);
+        }
+        let weights = DVec2::from(uv.map(f64::from));
+        let on = corners[0] + weights.x * (corners[1] - corners[0]) + weights.y * (corners[2] - corners[0]);
+        let [a, b, c] = self.corners[t];
+        (t, side, a + on.x * (b - a) + on.y * (c - a))
+    }
+
     /// Area of an element, m².
     pub fn area(&self, element: u32) -> f64 {
         let (t, _, _) = self.shape.place(element);
