@@ -382,7 +382,6 @@ fn the_first_picture_is_near_the_last() {
     }
 }
 
-/// Lights without area come and go like objects; one that is gone gives nothing and traces nothing.
 /// A point of a file becomes a spot that shines down, unless its node is turned; so does parallel light. A spot shines as it is turned.
 #[test]
 fn a_point_made_a_spot_shines_down() {
@@ -403,6 +402,28 @@ fn a_point_made_a_spot_shines_down() {
     }
 }
 
+/// A spot that a file has far away, far beyond where things may be put, is turned where it stands by any angle about any axis;
+/// rounding does not make it too far. Farther it goes not.
+#[test]
+fn a_far_spot_is_turned_where_it_stands() {
+    let spot = PointLightKind::Spot { inner: 0.2, outer: 0.6 };
+    let mut scene = with_lamps(&[(spot, [1e4; 3])]);
+    let at = glam::DVec3::new(-731.3, 947.1, 222.2);
+    scene.lights[0].position = at;
+    let mut session = Session::new(scene, &small()).unwrap();
+    let light = LightId(1);
+    for k in 0..60 {
+        let axis = glam::DVec3::new(f64::from(k % 3) - 0.7, 1.0, f64::from(k % 5) - 1.9).normalize();
+        let turn = glam::DMat4::from_axis_angle(axis, 0.1 * f64::from(k));
+        let about = glam::DMat4::from_translation(at) * turn * glam::DMat4::from_translation(-at);
+        let edit = Edit::MoveLight { light, matrix: about.to_cols_array() };
+        assert!(session.apply(&edit).is_ok(), "{k}");
+    }
+    let farther = glam::DMat4::from_translation(glam::DVec3::new(0.0, 0.01, 0.0)).to_cols_array();
+    assert!(session.apply(&Edit::MoveLight { light, matrix: farther }).is_err());
+}
+
+/// Lights without area come and go like objects; one that is gone gives nothing and traces nothing.
 #[test]
 fn lights_without_area_come_and_go() {
     let mut session = Session::new(cornell_box(), &small()).unwrap();

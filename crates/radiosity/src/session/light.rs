@@ -56,7 +56,7 @@ impl Light {
         let light = Light::new(kind_of(&point), &point.name);
         // Parallel light has no place that could be taken for one.
         let own = if point.kind == PointLightKind::Directional { 0.0 } else { distance(world, point.position) };
-        Light { reach: own.max(REACH * world.half), point: Some(point), ..light }
+        Light { reach: (own * ROUNDING).max(REACH * world.half), point: Some(point), ..light }
     }
 
     /// By what its light is multiplied.
@@ -74,6 +74,10 @@ impl Light {
         Some(light)
     }
 }
+
+/// What is far away in a file may be turned there, which moves it by rounding: a billionth is more than that of thousands of
+/// turns, and less than anybody moves a lamp.
+const ROUNDING: f64 = 1.0 + 1e-9;
 
 /// How far a place is from the middle of the scene, as far as reach goes.
 pub fn distance(world: &World, position: DVec3) -> f64 {
