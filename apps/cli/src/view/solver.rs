@@ -10,9 +10,11 @@ use radiosity::{Bands, Scene, luminance};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{mpsc, oneshot};
 
-/// Work between looks at what pages ask: an edit waits no longer.
+/// Work between looks at what pages ask, of light and planes together: an edit waits as long, and until the piece at hand is
+/// done and what is new is posted.
 const SLICE: Duration = Duration::from_millis(10);
 
 /// Light is posted this often at most; screens show no more.
@@ -93,6 +95,13 @@ struct Asked {
     answer: mpsc::Sender<String>,
 }
 
+impl Asked {
+    /// Whether its page has to read other answers first.
+    fn is_full(&self) -> bool {
+        self.answer.capacity() == 0
+    }
+}
+
 /// A layer that pages look at.
 struct Shown {
     layer: Layer,
@@ -161,9 +170,11 @@ impl Solver {
             if self.edited.is_none() && !self.release() {
                 return;
             }
-            self.work();
-            if self.edited.is_none() {
-                self.measure_planes();
+            self.turn();
+            // Nothing wakes this thread when a page reads its answers.
+            let is_stuck = !self.planes.is_empty() && self.planes.iter().all(Asked::is_full);
+            if is_stuck && self.is_done && self.held.is_none() {
+                std::thread::sleep(SLICE);
             }
         }
     }
@@ -283,11 +294,21 @@ impl Solver {
         None
     }
 
+    /// Works for a slice. Planes wait while an edit is not seen; else they have half of it, or all that light leaves.
+    fn turn(&mut self) {
+        let started = Instant::now();
+        let has_planes = self.edited.is_none() && !self.planes.iter().all(Asked::is_full);
+        self.work(if has_planes { SLICE / 2 } else { SLICE });
+        if self.edited.is_none() {
+            self.measure_planes(started + SLICE);
+        }
+    }
+
     /// A piece of work, and what is new of it on the board.
-    fn work(&mut self) {
+    fn work(&mut self, budget: Duration) {
         let mut is_complete = false;
         if !self.is_done {
-            let step = self.session.step(SLICE);
+            let step = self.session.step(budget);
             self.changed.extend(step.changed);
             (self.is_done, is_complete) = (step.is_done, step.is_complete || step.is_done);
             let status = self.session.status();
@@ -472,16 +493,22 @@ impl Solver {
         }
     }
 
-    /// Works a little on planes that pages wait for.
-    fn measure_planes(&mut self) {
-        let started = Instant::now();
+    /// Works on planes that pages wait for until a time, at least on a few points.
+    fn measure_planes(&mut self, until: Instant) {
         self.planes.retain(|asked| !asked.answer.is_closed());
-        while let Some(asked) = self.planes.first_mut() {
-            let measured = self.session.measure_plane(&mut asked.plane, SLICE.saturating_sub(started.elapsed()));
+        while let Some(next) = self.planes.iter().position(|asked| !asked.is_full()) {
+            let left = until.saturating_duration_since(Instant::now());
+            let measured = self.session.measure_plane(&mut self.planes[next].plane, left);
             let Some(measured) = measured.transpose() else { return };
-            let Asked { question, answer, .. } = self.planes.remove(0);
-            // A page that does not read its answers misses them.
-            let _ = answer.try_send(self.tell_plane(question, measured));
+            let asked = self.planes.remove(next);
+            let text = self.tell_plane(asked.question, measured);
+            // A page asks no other plane before it has this one.
+            if let Err(TrySendError::Full(_)) = asked.answer.try_send(text) {
+                self.planes.push(asked);
+            }
+            if left.is_zero() {
+                return;
+            }
         }
     }
 
@@ -546,4 +573,42 @@ fn unchanged(error: &EditError) -> String {
 /// A camera that was refused.
 fn not_kept(why: &str) -> String {
     Say::Refused { code: Refused::Camera, message: format!("Not kept: {why}.") }.text()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use radiosity::session::{PlaneQuestion, SessionOptions};
+
+    /// A page that has not read other answers gets its plane when it has; meanwhile other pages get theirs.
+    #[test]
+    fn a_plane_waits_until_its_page_reads() {
+        let options = SessionOptions { elements: 200, rays: 16, ..SessionOptions::default() };
+        let session = Session::new(radiosity::cornell_box(), &options).unwrap();
+        let mut solver = Solver::new(session, None, Arc::new(Board::new()));
+        let object = solver.model.objects.iter().find(|object| object.name == "floor").unwrap().id;
+        let about = PlaneQuestion { object, triangle: 0, uv: [0.3, 0.3], height: 0.05, border: 0.1 };
+        let (slow, mut unread) = mpsc::channel(1);
+        let (quick, mut answers) = mpsc::channel(1);
+        slow.try_send("unread".to_owned()).unwrap();
+        for (page, question, answer) in [(0, 7, &slow), (1, 8, &quick)] {
+            let request = Request::Plane { question, about };
+            assert!(solver.take(Command::Ask { page, request, answer: answer.clone() }));
+        }
+        let is_answer =
+            |text: &str, question: u64| text.contains(&format!("\"question\":{question}")) && text.contains("points");
+        let told = (0..100_000).find_map(|_| {
+            solver.turn();
+            answers.try_recv().ok()
+        });
+        assert!(told.is_some_and(|text| is_answer(&text, 8)));
+        (0..10).for_each(|_| solver.turn());
+        assert_eq!(unread.try_recv().as_deref(), Ok("unread"));
+        let told = (0..100_000).find_map(|_| {
+            solver.turn();
+            unread.try_recv().ok()
+        });
+        assert!(told.is_some_and(|text| is_answer(&text, 7)));
+        assert!(solver.planes.is_empty());
+    }
 }
