@@ -347,6 +347,36 @@ fn undo_restores_every_bit() {
 
 /// The first picture after an edit is near the light that follows: by less than a tenth of what paint changes, and by less
 /// than a quarter for a lamp that is moved, whose light has the noise of four shadow rays.
+/// The error that was told stayed that of the first light, whatever was dimmed.
+#[test]
+fn the_error_is_that_of_the_light_that_is_shown() {
+    let mut session = Session::new(furnished(), &small()).unwrap();
+    finish(&mut session);
+    let first = session.status().error;
+    let sky = session.model().lights.iter().find(|light| light.kind == LightKind::Sky).unwrap().id;
+    let off = Edit::Light { light: sky, dimming: 0.0, colour: [1.0; 3] };
+    let inverse = session.apply(&off).unwrap().inverse;
+    assert_eq!(session.status().error, first, "the old light is shown");
+    finish(&mut session);
+    let mut fresh = Session::new(furnished(), &small()).unwrap();
+    fresh.apply(&off).unwrap();
+    finish(&mut fresh);
+    assert_ne!(session.status().error, first);
+    assert_eq!(session.status().error, fresh.status().error);
+    session.apply(&inverse).unwrap();
+    finish(&mut session);
+    assert_eq!(session.status().error, first);
+
+    // It is not known of the first picture after a change, only of the last one.
+    let object = session.model().objects.last().unwrap().id;
+    let matrix = glam::DMat4::from_translation(glam::DVec3::new(0.1, 0.0, 0.0)).to_cols_array();
+    session.apply(&Edit::Move { object, matrix }).unwrap();
+    while !session.step(Duration::from_millis(1)).is_complete {}
+    assert!(session.status().error.is_infinite());
+    finish(&mut session);
+    assert!((0.5..2.0).contains(&(session.status().error / first)));
+}
+
 #[test]
 fn the_first_picture_is_near_the_last() {
     let shift = glam::DMat4::from_translation(glam::DVec3::new(0.5, 0.0, 0.4)).to_cols_array();

@@ -75,7 +75,9 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     progress.setAttribute('aria-valuenow', share.toFixed(0));
     progress.classList.toggle('done', status.is_done);
     rays.textContent = `${status.rays} of ${status.most_rays} rays`;
-    error.textContent = status.error === null ? 'error not known yet' : `± ${percent(status.error)}`;
+    // After a change it is known again when all rays are there; the bar does not jump meanwhile.
+    const unknown = status.edits > 0 ? '± …' : 'error not known yet';
+    error.textContent = status.error === null ? unknown : `± ${percent(status.error)}`;
     left.textContent = status.is_done ? `done in ${duration(status.seconds)}` : status.left === null ? '' : `${duration(status.left)} left`;
   });
   return el('header', {},

@@ -105,7 +105,7 @@ pub struct Status {
     /// Rays per element at the end.
     pub most_rays: u32,
     /// One standard error of the irradiance by the rays of rows, relative, in the area-weighted mean square; that of shadow
-    /// rays and of the elements' size are not in it. Infinite while dark.
+    /// rays and of the elements' size are not in it. Infinite while dark, and after an edit until it is known of its light.
     pub error: f64,
     /// Relative residual of what is shown.
     pub residual: f64,

@@ -71,8 +71,10 @@ pub struct State {
     pub factors: Vec<Bands>,
     /// Rays of the rows that it is of; none while dark.
     pub solved_rays: u32,
-    /// Relative standard error.
+    /// Relative standard error of what is shown; infinite while it is dark, and where that is not known.
     pub error: f64,
+    /// Whether `error` was looked for in what is shown.
+    is_judged: bool,
     /// Of the last solve.
     pub residual: f64,
     /// Objects whose light is another than last told.
@@ -122,15 +124,19 @@ impl State {
 impl Session {
     /// Whether nothing is left to do.
     pub(super) fn is_done(&self) -> bool {
-        self.state.has_columns && self.state.is_summed && self.state.rest.is_some()
+        self.state.has_columns && self.state.is_summed && self.state.rest.is_some() && self.state.is_judged
     }
 
     /// One piece of work: as many rays as there is time for, or a sweep.
     pub(super) fn piece(&mut self, deadline: Instant) {
         let (target, most) = (self.live.target(), self.live.most());
         if self.state.has_columns {
-            // The second so that the next edit need not do it.
-            return if self.state.is_summed { self.find_rest() } else { self.sum_columns() };
+            // The second so that the next edit need not do it, the third as each dimming makes another noise.
+            return match (self.state.is_summed, self.state.rest.is_some()) {
+                (false, _) => self.sum_columns(),
+                (true, false) => self.find_rest(),
+                (true, true) => self.judge(),
+            };
         }
         if target.rays == 0 {
             return self.live.set_target(self.level(FIRST_RAYS));
@@ -394,7 +400,6 @@ impl Session {
         let e = self.emission();
         let mut y = vec![Lanes::default(); h.len()];
         self.answer.respond(&e, &h, &mut y);
-        let is_first = !self.state.is_edited;
         (self.state.direct, self.state.given) = (self.direct_light(), y);
         self.state.is_summed = true;
         self.state.is_edited = false;
@@ -402,9 +407,6 @@ impl Session {
         self.state.movers.clear();
         self.state.solved_rays = self.live.target().rays;
         self.show(h);
-        if is_first {
-            self.judge();
-        }
     }
 
     /// By what a strand's column is multiplied.
@@ -488,6 +490,8 @@ impl Session {
         state.shown = h;
         state.factors = factors;
         state.revision += 1;
+        // The noise of other light says nothing of this.
+        (state.error, state.is_judged) = (f64::INFINITY, false);
     }
 
     /// Half the differences between the halves of rows, lux per band by id: one standard error of each.
@@ -510,6 +514,7 @@ impl Session {
             whole += f64::from(*area) * of(h).powi(2);
         }
         self.state.error = if whole > 0.0 { (square / whole).sqrt() } else { 0.0 };
+        self.state.is_judged = true;
     }
 }
 
