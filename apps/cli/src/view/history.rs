@@ -1,6 +1,6 @@
 //! What can be undone, by whichever page it was done.
 
-use radiosity::session::{Edit, LightId, Model, ObjectId};
+use radiosity::session::{Edit, EditError, LightId, Model, ObjectId};
 
 /// Most changes that are remembered.
 const LONGEST: usize = 1000;
@@ -131,6 +131,40 @@ pub fn label(edit: &Edit, model: &Model) -> String {
     }
 }
 
+/// Why an edit was refused, with names as the page has them in place of ids.
+pub fn refusal(error: &EditError, model: &Model) -> String {
+    let text = error.to_string();
+    let (id, name) = match error {
+        EditError::Light { light, .. }
+        | EditError::ChangeLight { light, .. }
+        | EditError::NotPlaceable(light)
+        | EditError::DeletedLight(light)
+        | EditError::LightNotDeleted(light) => (format!("light {}", light.0), light_name(*light, model)),
+        EditError::Reflectance { object, .. }
+        | EditError::TooFar { object, .. }
+        | EditError::Deleted(object)
+        | EditError::NotDeleted(object) => (format!("object {}", object.0), object_name(*object, model)),
+        _ => return text,
+    };
+    text.replacen(&id, &name, 1)
+}
+
+/// Copies have the name of the first, and numbers.
+fn light_name(id: LightId, model: &Model) -> String {
+    let named = model.lights.iter().find(|light| light.id == id).map_or("", |light| light.name.as_str());
+    let before = model.lights.iter().filter(|light| light.id < id && light.name == named).count();
+    match (named, before) {
+        ("", _) => format!("Light {}", id.0 + 1),
+        (name, 0) => name.to_owned(),
+        (name, _) => format!("{name} ({})", before + 1),
+    }
+}
+
+fn object_name(id: ObjectId, model: &Model) -> String {
+    let named = model.objects.iter().find(|object| object.id == id).map_or("", |object| object.name.as_str());
+    if named.is_empty() { format!("Object {}", id.0 + 1) } else { named.to_owned() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,6 +186,23 @@ mod tests {
         history.redid(dim(0, 0.8));
         history.did("dim b".into(), dim(1, 1.0), None);
         assert_eq!(history.next_redo(), None, "what was undone is gone after a new change");
+    }
+
+    #[test]
+    fn what_is_refused_is_named_as_the_page_names_it() {
+        use radiosity::session::{ModelLight, Session, SessionOptions};
+        let options = SessionOptions { elements: 200, rays: 4, ..SessionOptions::default() };
+        let mut model = Session::new(radiosity::cornell_box(), &options).unwrap().model();
+        let lamp = ModelLight { name: "Lamp 1".to_owned(), ..model.lights[0].clone() };
+        model.lights = (0..3).map(|id| ModelLight { id: LightId(id), ..lamp.clone() }).collect();
+        model.lights[0].name.clear();
+        let told = |light| refusal(&EditError::ChangeLight { light: LightId(light), why: "too far" }, &model);
+        assert_eq!(
+            [0, 1, 2].map(told),
+            ["Light 1", "Lamp 1", "Lamp 1 (2)"].map(|n| format!("{n} cannot be changed: too far"))
+        );
+        let object = refusal(&EditError::Deleted(ObjectId(0)), &model);
+        assert_eq!(object, format!("{} has been deleted (restore it first)", model.objects[0].name));
     }
 
     #[test]

@@ -231,7 +231,7 @@ impl Solver {
                     self.post_history();
                     None
                 }
-                Err(error) => Some(unchanged(&error)),
+                Err(error) => Some(unchanged(&error, &self.model)),
             },
             Request::Undo | Request::Redo => {
                 let is_undo = *request == Request::Undo;
@@ -240,7 +240,7 @@ impl Solver {
                 match self.apply(&edit, since) {
                     Ok(inverse) if is_undo => self.history.undid(inverse),
                     Ok(inverse) => self.history.redid(inverse),
-                    Err(error) => return Some(unchanged(&error)),
+                    Err(error) => return Some(unchanged(&error, &self.model)),
                 }
                 self.post_history();
                 None
@@ -566,8 +566,8 @@ fn shares(named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
 }
 
 /// An edit that was refused.
-fn unchanged(error: &EditError) -> String {
-    Say::Refused { code: Refused::Edit, message: format!("Not changed: {error}.") }.text()
+fn unchanged(error: &EditError, model: &Model) -> String {
+    Say::Refused { code: Refused::Edit, message: format!("Not changed: {}.", history::refusal(error, model)) }.text()
 }
 
 /// A camera that was refused.

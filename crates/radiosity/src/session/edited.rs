@@ -518,7 +518,7 @@ fn check_lamp(kind: PointLightKind, intensity: &Bands) -> Result<(), &'static st
     }
     match kind {
         PointLightKind::Spot { inner, outer } if !(inner >= 0.0 && inner <= outer && outer <= MOST_CONE) => {
-            Err("the half angles of a spot are 0 or more, the outer one no less than the inner and at most π/2")
+            Err("the half angles of a spot go from 0 to 90°, the inner one no farther than the outer")
         }
         _ => Ok(()),
     }
