@@ -504,7 +504,7 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
         ));
     }
     let closure = &found.closure;
-    let [low, high] = found.row_sums;
+    let [low, high] = found.row_sums.map(unsigned_zero);
     let of = if table.is_script_f { "rows of F" } else { "rows" };
     lines.push(format!("{of} sum to {low:.7} … {high:.7}, as found"));
     if enclosure.is_closed || high > 1.0 + 1e-3 || low > 1.0 - 1e-2 {
@@ -538,13 +538,18 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
         });
     }
     if table.is_script_f {
-        let [low, high] = table.row_sums();
+        let [low, high] = table.row_sums().map(unsigned_zero);
         lines.push(format!(
             "script-F, with all reflections in it, is what goes out: its rows sum to {low:.7} … {high:.7} (in a closed \
              enclosure to emittances), and no error is known of it"
         ));
     }
     lines
+}
+
+/// A sum as it is written with seven decimals: that of nothing is 0, and not −0 as IEEE 754 has it.
+fn unsigned_zero(sum: f64) -> f64 {
+    if sum.abs() < 0.5e-7 { 0.0 } else { sum }
 }
 
 fn largest_error(enclosure: &Enclosure, found: &Factors) -> String {
