@@ -22,6 +22,9 @@ export type Topic =
 /** Milliseconds between edits of one gesture: more often than light can follow is of no use. */
 const GESTURE = 40;
 
+/** Milliseconds that a refusal is told. */
+const READ = 10_000;
+
 const WRAPS = { repeat: RepeatWrapping, mirror: MirroredRepeatWrapping, clamp: ClampToEdgeWrapping } as const;
 
 /** What was measured at a point, and where it is. */
@@ -83,6 +86,12 @@ export class App {
   private gesture = 0;
   private pending: { gesture?: number; send: () => void; timer: number } | null = null;
   private lastSent = 0;
+  /** The gesture of the last edit, and what was refused since it began. */
+  private editing: number | undefined;
+  private refusal = '';
+  private refusalTimer = 0;
+  /** How lights were dimmed before all of them were turned off. */
+  private levels = new Map<number, number>();
 
   constructor() {
     this.connection = new Connection({
@@ -154,6 +163,8 @@ export class App {
         this.hearLight(notice);
         break;
       case 'status':
+        // Another page may have changed something.
+        if (this.status && notice.edits !== this.status.edits) this.exposure.hold();
         this.status = notice;
         this.tell('status');
         break;
@@ -184,8 +195,9 @@ export class App {
       case 'refused':
         this.say(notice.message);
         if (notice.code === 'layer') this.rest(notice.message);
+        else this.refused(notice.message);
         // A message that could not be read may have been a change.
-        else if (notice.code !== 'camera') this.takeBack();
+        if (notice.code !== 'layer' && notice.code !== 'camera') this.takeBack();
         break;
     }
   }
@@ -270,6 +282,18 @@ export class App {
     this.tell('view');
   }
 
+  /** A refusal is told until something else is changed, and not longer than it takes to read. */
+  private refused(message: string): void {
+    this.refusal = message;
+    clearTimeout(this.refusalTimer);
+    this.refusalTimer = setTimeout(() => this.forgive(), READ);
+  }
+
+  private forgive(): void {
+    if (this.refusal && this.message === this.refusal) this.say('');
+    this.refusal = '';
+  }
+
   /** What was refused is as before, here too. */
   private takeBack(): void {
     this.awaited = [];
@@ -322,6 +346,10 @@ export class App {
 
   /** Changes the scene. Edits of one gesture, such as a drag, are sent at a steady pace and undone together. */
   edit(edit: Edit, gesture?: number): void {
+    // Of a gesture that is refused each edit may be: told once, it stays.
+    if (gesture === undefined || gesture !== this.editing) this.forgive();
+    this.editing = gesture;
+    this.exposure.hold();
     // What waits is outdated by an edit of the same gesture, and comes first before any other.
     if (this.pending && this.pending.gesture === gesture) this.drop();
     else this.flush();
@@ -366,6 +394,8 @@ export class App {
     // What is held in the hand is put down first.
     if (this.gizmo.isDragging) return;
     this.flush();
+    this.forgive();
+    this.exposure.hold();
     this.objectsAhead.forget();
     this.lightsAhead.forget();
     if (!this.connection.send({ kind })) this.say('Not connected: nothing was changed.');
@@ -539,10 +569,27 @@ export class App {
     if (deletions.length > 0) this.edit(deletions.length === 1 ? deletions[0] : { several: deletions });
   }
 
-  /** Turns lights on or off together. */
-  setLights(dimming: number): void {
-    const lights = [...this.lights.values()].filter((light) => !light.deleted);
-    this.edit({ several: lights.map(({ id, colour }) => ({ light: { light: id, dimming, colour } })) });
+  /** Turns all lights off. */
+  turnOff(): void {
+    const lit = this.present().filter(({ dimming }) => dimming > 0);
+    if (lit.length > 0) this.levels = new Map(this.present().map(({ id, dimming }) => [id, dimming]));
+    this.dimAll(() => 0);
+  }
+
+  /** Turns lights on: those that are off as they were before all of them were turned off, else all of them fully. */
+  turnOn(): void {
+    const before = ({ id, dimming }: LightNotice) => dimming || (this.levels.get(id) ?? 0);
+    const isBack = this.present().every((light) => before(light) === light.dimming);
+    this.dimAll(isBack ? () => 1 : before);
+    this.levels.clear();
+  }
+
+  private present(): LightNotice[] {
+    return [...this.lights.values()].filter((light) => !light.deleted);
+  }
+
+  private dimAll(level: (light: LightNotice) => number): void {
+    this.edit({ several: this.present().map((light) => ({ light: { light: light.id, dimming: level(light), colour: light.colour } })) });
   }
 
   select(object: number | null): void {
@@ -656,6 +703,7 @@ export class App {
     for (const surface of this.stage.surfaces.values()) this.stage.shine(surface, 0, new Uint16Array(surface.light.array.length));
     shared.emissionShown.value = layer === 'total' || layer === 'direct' ? 1 : 0;
     this.connection.look(layer);
+    this.exposure.free();
     this.paintMode();
   }
 

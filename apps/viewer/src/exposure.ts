@@ -1,4 +1,6 @@
 // Exposure as the program chooses it for pictures: the median of what is seen at 0.24 of white, the brightest tenth below 0.8.
+// It follows the camera, as eyes do. While one looks the same way, changes do not move it: what is dimmed looks darker, and what else
+// is there looks no brighter for it. Only where light becomes so bright that the picture would be white it goes down, and back.
 import type { Stage } from './stage';
 import { shared } from './surface';
 import { rangeOf, ticks } from './scale';
@@ -6,6 +8,10 @@ import { rangeOf, ticks } from './scale';
 /** Milliseconds between looks at the meter, and how long the eye takes. */
 const EVERY = 250;
 const ADAPTATION = 180;
+
+/** By how much a picture may become brighter than it would be chosen before exposure goes down, log2: then half of what is seen is
+ *  above 0.48 of white. */
+const GLARE = 1;
 
 export class Exposure {
   /** log2 of the factor from cd/m² to the display. */
@@ -19,6 +25,9 @@ export class Exposure {
   private isDue = false;
   private last = 0;
   private hasLight = false;
+  /** What it was before the first change in this view; not higher until the camera moves. */
+  private most: number | null = null;
+  private view = '';
 
   constructor(private stage: Stage, private changed: () => void) {
     this.scale([10, 1000]);
@@ -29,10 +38,21 @@ export class Exposure {
     this.isDue = true;
   }
 
+  /** Something was changed: exposure stays, so that one sees what it does. */
+  hold(): void {
+    if (this.hasLight) this.most ??= this.wanted;
+  }
+
   /** Looks again soon. */
   meter(): void {
     this.isDue = true;
     this.last = 0;
+  }
+
+  /** Looks again soon, as in a new view. */
+  free(): void {
+    this.most = null;
+    this.meter();
   }
 
   set(value: number): void {
@@ -43,7 +63,7 @@ export class Exposure {
 
   automatic(): void {
     this.isAutomatic = true;
-    this.meter();
+    this.free();
     this.changed();
   }
 
@@ -76,6 +96,13 @@ export class Exposure {
       if (Math.abs(this.wanted - this.value) <= 0.01) this.value = this.wanted;
       this.apply();
     }
+    const { camera } = this.stage;
+    const view = `${camera.matrixWorld.elements.join()} ${camera.fov} ${camera.aspect}`;
+    if (view !== this.view) {
+      this.view = view;
+      this.most = null;
+      this.isDue = true;
+    }
     if (!this.isDue || now - this.last < EVERY) return;
     this.isDue = false;
     this.last = now;
@@ -88,10 +115,12 @@ export class Exposure {
       this.isDue = true;
       return;
     }
+    // In the dark eyes stay as they are.
     if (this.isAutomatic && seen.luminance.length > 0) {
       seen.luminance.sort((a, b) => a - b);
       const at = (share: number) => Math.max(seen.luminance[Math.floor((seen.luminance.length - 1) * share)], 1e-30);
-      this.wanted = Math.log2(Math.min(0.24 / at(0.5), 0.8 / at(0.9)));
+      const chosen = Math.log2(Math.min(0.24 / at(0.5), 0.8 / at(0.9)));
+      this.wanted = this.most === null ? chosen : Math.min(this.most, chosen + GLARE);
       if (!this.hasLight) {
         // The first light comes up from the dark.
         this.hasLight = true;

@@ -1,5 +1,6 @@
 // Pictures of what is seen, and tables of what was measured.
 import type { App } from './app';
+import { drawOver } from './legend';
 import { measured } from './plane';
 
 /** Hands the points of the grid or of the plane to the person: with normals, as `radiosity measure` reads points. */
@@ -25,15 +26,34 @@ function save(app: App, blob: Blob, ending: string): string {
   return link.download;
 }
 
-/** Hands the picture on the screen to the person. */
+/** Hands the picture on the screen to the person, with what was measured and the scale of its colours. */
 export function screenshot(app: App): void {
-  const { overlay, tools } = app.stage;
-  overlay.visible = tools.visible = false;
+  const { canvas } = app.stage;
+  const show = app.marks.hide();
   app.stage.drawNow();
-  app.stage.canvas.toBlob((blob) => {
-    overlay.visible = tools.visible = true;
-    app.stage.change();
+  const pen = Object.assign(document.createElement('canvas'), { width: canvas.width, height: canvas.height }).getContext('2d')!;
+  // At once: the browser may forget what was drawn when it shows the page.
+  pen.drawImage(canvas, 0, 0);
+  show();
+  app.stage.change();
+  drawOver(app, pen);
+  pen.canvas.toBlob((blob) => {
     if (!blob) return app.say('The picture could not be made.');
-    app.say(`Screenshot saved as ${save(app, blob, '.png')}.`);
+    app.say(`Screenshot saved as ${save(app, blob, `${next(app)}.png`)}.`);
   }, 'image/png');
 }
+
+/** The number of the next picture of a scene: each is a file of its own, also when the page was opened anew. */
+function next(app: App): number {
+  const key = `radiosity.pictures.${app.scene?.name ?? ''}`;
+  try {
+    pictures = Math.max(pictures, Number(localStorage.getItem(key)) || 0);
+    localStorage.setItem(key, String(pictures + 1));
+  } catch {
+    // Where nothing may be kept, pictures are counted from one whenever the page is opened.
+  }
+  pictures += 1;
+  return pictures;
+}
+
+let pictures = 0;

@@ -2,6 +2,7 @@
 import { Vector3 } from 'three';
 import type { App } from './app';
 import { el } from './panels/parts';
+import { layerName } from './panels/view';
 import { measured } from './plane';
 import { PALETTE, readable } from './scale';
 import { shared } from './surface';
@@ -13,15 +14,62 @@ export function legend(app: App): HTMLElement {
   const unit = el('span', { class: 'unit' }, 'lx');
   const element = el('aside', { class: 'legend', id: 'legend', 'aria-label': 'Scale of illuminance' }, unit, el('div', { class: 'scale' }, bar, marks));
   app.on('view', () => {
-    const isColoured = app.falseColours || app.layer === 'error' || Boolean(app.plane?.answer);
-    element.hidden = !isColoured && !shared.isolines.value;
-    bar.hidden = !isColoured;
+    element.hidden = !isScaled(app);
+    bar.hidden = !isColoured(app);
     app.marks.colourPlane();
-    const [low, high] = app.exposure.range;
-    const place = (value: number) => (100 * Math.log(value / low)) / Math.log(high / low);
-    marks.replaceChildren(...app.exposure.levels.map((level) => el('span', { style: `bottom:${place(level)}%` }, readable(level))));
+    marks.replaceChildren(...app.exposure.levels.map((level) => el('span', { style: `bottom:${100 * share(app, level)}%` }, readable(level))));
   });
   return element;
+}
+
+/** Whether colours stand for numbers, and whether colours or lines do. */
+const isColoured = (app: App): boolean => app.falseColours || app.layer === 'error' || Boolean(app.plane?.answer);
+const isScaled = (app: App): boolean => isColoured(app) || shared.isolines.value;
+
+/** Where a value is on the scale, 0..1. */
+function share({ exposure: { range: [low, high] } }: App, value: number): number {
+  return Math.log(value / low) / Math.log(high / low);
+}
+
+/** Draws what the page has over the picture into it: the scale, with what it is of, and the numbers of a grid. */
+export function drawOver(app: App, pen: CanvasRenderingContext2D): void {
+  const page = app.stage.canvas.getBoundingClientRect();
+  pen.scale(pen.canvas.width / page.width, pen.canvas.height / page.height);
+  pen.textBaseline = 'middle';
+  pen.lineJoin = 'round';
+  pen.font = '600 11px system-ui, sans-serif';
+  [pen.strokeStyle, pen.lineWidth, pen.fillStyle] = ['#000', 3, '#fff'];
+  for (const span of document.querySelectorAll<HTMLElement>('.numbers-over span:not([hidden])')) {
+    const box = span.getBoundingClientRect();
+    const at: [string, number, number] = [span.textContent ?? '', box.left - page.left, box.top + 0.5 * box.height - page.top];
+    pen.strokeText(...at);
+    pen.fillText(...at);
+  }
+  if (isScaled(app)) drawScale(app, pen, page.height);
+}
+
+/** The scale at the lower left of a picture, as the page has it; `tall` is the picture, CSS pixels. */
+function drawScale(app: App, pen: CanvasRenderingContext2D, tall: number): void {
+  pen.font = '12px system-ui, sans-serif';
+  const title = `${layerName(app, app.layer)}, lx`;
+  const height = Math.min(0.38 * tall, 260);
+  const [left, top] = [26, tall - 28 - height];
+  pen.fillStyle = '#101214d0';
+  pen.beginPath();
+  pen.roundRect(14, top - 36, Math.max(60, pen.measureText(title).width) + 24, height + 50, 8);
+  pen.fill();
+  pen.fillStyle = '#e8e6e1';
+  pen.fillText(title, left, top - 20);
+  for (const level of app.exposure.levels) {
+    const y = top + height * (1 - share(app, level));
+    pen.fillRect(left + 14, y - 0.5, 5, 1);
+    pen.fillText(readable(level), left + 22, y);
+  }
+  if (!isColoured(app)) return;
+  const colours = pen.createLinearGradient(0, top + height, 0, top);
+  PALETTE.forEach((c, i) => colours.addColorStop(i / (PALETTE.length - 1), `rgb(${c.map((x) => Math.round(255 * x)).join(' ')})`));
+  pen.fillStyle = colours;
+  pen.fillRect(left, top, 14, height);
 }
 
 /** Most numbers that are written on the picture. */

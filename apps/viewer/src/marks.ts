@@ -2,7 +2,7 @@
 // without area.
 import {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh,
-  MeshBasicMaterial, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, SRGBColorSpace, Vector3, WireframeGeometry,
+  MeshBasicMaterial, type Object3D, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, SRGBColorSpace, Vector3, WireframeGeometry,
 } from 'three';
 import type { Grid } from './grid';
 import { falseColour } from './scale';
@@ -24,6 +24,16 @@ export class Marks {
   private lampPicture: CanvasTexture | null = null;
 
   constructor(private stage: Stage) {}
+
+  /** Hides all but what was measured, for a picture that is kept; what comes back shows it again. */
+  hide(): () => void {
+    const kept: (Object3D | null | undefined)[] = [this.gridded, this.cells?.mesh];
+    const all = [...this.stage.overlay.children, ...this.stage.tools.children];
+    const hidden = all.filter((thing) => thing.visible && !kept.includes(thing));
+    const show = (is: boolean) => hidden.forEach((thing) => { thing.visible = is; });
+    show(false);
+    return () => show(true);
+  }
 
   /** A line around what is selected. */
   outline(surfaces: Surface[]): void {

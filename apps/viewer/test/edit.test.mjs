@@ -213,7 +213,7 @@ test('what is refused is taken back, and a copy is selected', async () => {
     return app.objects.get(id).matrix[12];
   }, block.id);
   assert.ok(ahead > 1e5, 'shown at once');
-  await page.waitForFunction(() => /Not changed/.test(window.radiosity.state().message));
+  await page.waitForFunction(() => /Not changed: short block would be/.test(window.radiosity.state().message));
   assert.deepEqual((await named(page, 'short block')).matrix, block.matrix);
   const [at, handles] = await page.evaluate(() => [window.radiosity.app.spot().toArray(), window.radiosity.app.gizmo.where()]);
   at.forEach((value, k) => assert.ok(Math.abs(value - handles[k]) < 1e-6));
@@ -221,6 +221,12 @@ test('what is refused is taken back, and a copy is selected', async () => {
   await page.evaluate(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming: 1e9 }));
   await page.waitForFunction(() => window.radiosity.state().lights[0].dimming === 1);
   assert.equal(await page.locator('.light input[type=number]').first().inputValue(), '100');
+
+  assert.match((await state(page)).message, /Not changed/);
+  const { edits } = (await state(page)).status;
+  await page.evaluate(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming: 0.9 }));
+  await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, edits);
+  assert.equal((await state(page)).message, '', 'a refusal goes with the next change');
 
   const { objects } = await state(page);
   await page.evaluate(() => window.radiosity.app.duplicate());
@@ -233,6 +239,50 @@ test('what is refused is taken back, and a copy is selected', async () => {
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });
+
+test('what is dimmed looks darker, its error is told, and lamps that were turned off together come back as they were', () => inStudio(async (page) => {
+  const levels = async () => (await state(page)).lights.map(({ dimming }) => dimming);
+  const exposure = async () => {
+    await done(page);
+    // Eyes take a while.
+    for (let last = null; ;) {
+      await page.waitForTimeout(1000);
+      const now = (await state(page)).exposure;
+      if (now === last) return now;
+      last = now;
+    }
+  };
+  const edited = async (change) => {
+    const { edits } = (await state(page)).status;
+    await page.evaluate(change);
+    await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, edits);
+    await done(page);
+  };
+  const [before, { error }] = [await exposure(), (await state(page)).status];
+  await edited(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming: 0.3 }));
+  await edited(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(1), { dimming: 0 }));
+  assert.equal(await exposure(), before);
+  const dimmed = (await state(page)).status.error;
+  assert.notEqual(dimmed, error);
+  const chosen = await levels();
+  await edited(() => window.radiosity.app.turnOff());
+  assert.ok((await levels()).every((level) => level === 0));
+  assert.equal(await exposure(), before, 'in the dark, too');
+  await edited(() => window.radiosity.app.turnOn());
+  assert.deepEqual(await levels(), chosen);
+  assert.equal((await state(page)).status.error, dimmed);
+  // Who looks elsewhere sees with other eyes.
+  assert.equal(await exposure(), before);
+  await page.evaluate(() => {
+    window.radiosity.app.stage.camera.rotateZ(0.01);
+    window.radiosity.app.stage.change();
+  });
+  await page.waitForFunction((before) => window.radiosity.state().exposure > before + 0.2, before);
+  await edited(() => window.radiosity.app.turnOn());
+  assert.ok((await levels()).every((level) => level === 1));
+  await edited(() => window.radiosity.app.undo());
+  assert.deepEqual(await levels(), chosen);
+}));
 
 test('lamps without area, sheets and colours at vertices', () => inStudio(async (page) => {
   await page.evaluate(() => window.radiosity.app.exposure.set(-5));

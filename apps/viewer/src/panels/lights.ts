@@ -12,8 +12,8 @@ export function lightsPanel(app: App): HTMLElement {
   const rows = new Map<number, (light: LightNotice) => void>();
   const none = el('p', { class: 'quiet' }, 'This scene has no light.');
   const all = el('div', { class: 'row' },
-    button('All on', () => app.setLights(1), { title: 'Turn all lights on' }),
-    button('All off', () => app.setLights(0), { title: 'Turn all lights off' }));
+    button('All on', () => app.turnOn(), { title: 'Turn all lights on; after “All off” as they were' }),
+    button('All off', () => app.turnOff(), { title: 'Turn all lights off' }));
   const kind = el('select', {
     id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind; },
   }, ...LAMPS.map(([value, text]) => el('option', { value }, text)));
