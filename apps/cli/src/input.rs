@@ -163,7 +163,7 @@ impl SolveArguments {
         piece: f64,
         instead: impl FnOnce(f64) -> String,
     ) -> Result<(), Failure> {
-        let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+        let area = mesh.whole_area();
         let (bytes, allowed) = (bytes as f64, self.memory as f64);
         let (count, needed) = (area / piece, area / piece * bytes);
         if needed <= allowed {

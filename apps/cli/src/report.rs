@@ -307,7 +307,7 @@ impl Report {
                 materials: input.scene.materials.len(),
                 lights: lights.map(|(i, l)| light((i, l.name()))).collect(),
                 other_light: other_light(input, !solution.luminaires.lights.is_empty()),
-                area: (0..input.mesh.triangles.len()).map(|t| input.mesh.area(t)).sum(),
+                area: input.mesh.whole_area(),
             },
             error: ErrorReport {
                 finer,

@@ -134,8 +134,9 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         // The field does not know contacts below the size of its elements: gathering at each point does, and costs less
         // than elements that small.
         let mut rays = gather_rays(options.error);
-        let (mut audit, mut gather, mut light) = read(if solve.looked_up { rays } else { 0 })?;
-        rays <<= usize::from(solve.looked_up);
+        let first = if solve.looked_up { rays } else { 0 };
+        let (mut audit, mut gather, mut light) = read(first)?;
+        rays = rays.max(2 * first);
         let affordable = SOLUTIONS * solution.rays_in_all() / automatic_texels(tracer.mesh.triangles.len() / 2);
         for doublings in 0.. {
             let is_dear = doublings >= GATHERS && rays as f64 > affordable;

@@ -2,8 +2,8 @@
 
 use crate::{Solution, SolveOptions};
 use glam::DVec2;
+use radiosity_scene::Side;
 use radiosity_scene::elements::triangle_from_square;
-use radiosity_scene::{Mesh, Side};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
@@ -22,17 +22,12 @@ impl SolveOptions {
     /// holds. As many for all rooms together as one of them has would leave each a few.
     pub(crate) fn cells_on_path(&mut self, tracer: &Tracer, count: f64) {
         let size = mean_path(tracer) / count;
-        let mut wanted = ((2.0 * area(tracer.mesh) / (size * size)) as usize).min(MOST_CELLS);
+        let mut wanted = ((2.0 * tracer.mesh.whole_area() / (size * size)) as usize).min(MOST_CELLS);
         while wanted > self.cells && Solution::memory(tracer, &SolveOptions { cells: wanted, ..*self }) > self.memory {
             wanted /= 2;
         }
         self.cells = self.cells.max(wanted);
     }
-}
-
-/// Area of all triangles, m².
-pub(crate) fn area(mesh: &Mesh) -> f64 {
-    (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum()
 }
 
 /// Mean distance from a place on a surface to what it sees, metres: 4 V/A in an empty room of volume V and area A (the mean

@@ -136,6 +136,11 @@ impl Mesh {
         0.5 * (b - a).cross(c - a).length()
     }
 
+    /// Area of all triangles, m².
+    pub fn whole_area(&self) -> f64 {
+        (0..self.triangles.len()).map(|triangle| self.area(triangle)).sum()
+    }
+
     /// Unit normal of a triangle's front.
     pub fn normal(&self, triangle: usize) -> DVec3 {
         let [a, b, c] = self.corners(triangle);
@@ -515,7 +520,7 @@ mod tests {
         let mesh = Mesh::new(&scene);
         assert!(mesh.is_split());
         assert_eq!(mesh.triangles.len(), 10 + 3);
-        let area: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+        let area = mesh.whole_area();
         assert!((area - 4.0).abs() < 1e-12, "{area}");
         assert!(mesh.hanging_vertices(&Contacts::default()).is_empty());
         // Points keep their place on the source triangle.

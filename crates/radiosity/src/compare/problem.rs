@@ -77,7 +77,7 @@ impl Receivers for Whole<'_> {
 /// Width of elements of which there are about `wanted`: the largest that makes so many, found by halving.
 pub(super) fn element_size(tracer: &Tracer, wanted: usize) -> f64 {
     let (scene, mesh) = (tracer.scene, tracer.mesh);
-    let total: f64 = (0..mesh.triangles.len()).map(|t| mesh.area(t)).sum();
+    let total = mesh.whole_area();
     let guess = (2.0 * total / wanted.max(1) as f64).sqrt();
     let off = |size: f64| Elements::count(scene, mesh, size).abs_diff(wanted);
     // Counts go in steps, of which the nearest is looked for.

@@ -70,7 +70,7 @@ struct Contact {
 impl Mesh {
     /// Cuts surfaces along their contacts.
     pub(super) fn cut_along_contacts(&mut self, scene: &Scene, weld: &mut Weld) -> Contacts {
-        let area: f64 = (0..self.triangles.len()).map(|t| self.area(t)).sum();
+        let area = self.whole_area();
         let (mut list, found_all) = self.contacts(scene);
         self.keep_long(&mut list, LEAST_RUN * (2.0 * area / ELEMENTS).sqrt());
         list.sort_by_key(|contact| contact.host);
