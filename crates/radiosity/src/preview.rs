@@ -1,9 +1,9 @@
 //! Pictures on the way (catalogue 43): a first one within moments, then those of ever better coarse solutions, each whole.
 //!
 //! The first asks no more of the scene than what the camera sees of it: direct light there, and for the rest the ambient term
-//! H = Σ A B₀/Σ A (1 − ρ) (Cohen et al. 1988, sect. 4.2), B₀ being what elements give off without indirect light. The sums are over
-//! all that is seen and one element in [`EACH`] of the others, which stands for them. Nothing is examined for being buried, so
-//! where things touch it may be too dark. Sky light comes with the rays.
+//! H = Σ A B₀/Σ A (1 − ρ) (Cohen et al. 1988, sect. 4.2), B₀ being what elements give off without indirect light. The sums are
+//! over all elements; direct light is asked of those that are seen and of one in [`EACH`] of the others, which stands for them.
+//! Nothing is examined for being buried, so where things touch it may be too dark. Sky light comes with the rays.
 //!
 //! A picture of a solution as it stands takes no shadow ray and no gather: the irradiance of elements, direct light with
 //! it, read as a continuous field. What it misses, the fine edges of shadows, comes with the picture at the end. What a
@@ -13,9 +13,11 @@ use crate::division::Optics;
 use crate::monitor::{Monitor, Watch};
 use crate::solution::element_size;
 use crate::{Error, Solution, SolveOptions};
+use glam::DVec3;
 use radiosity_scene::{Bands, Camera, Elements};
-use radiosity_trace::{Place, Tracer};
-use radiosity_transport::{ElementReceivers, Exposure, Luminaires, Receivers, Shadowing, Site};
+use radiosity_trace::Tracer;
+use radiosity_trace::sampling::{hash, unit};
+use radiosity_transport::{ElementReceivers, Exposure, Luminaires, ShadedReceivers, Shadowing};
 use radiosity_view::{Field, Picture, ViewRays};
 use rayon::prelude::*;
 
@@ -28,9 +30,10 @@ const MOST_RAYS: usize = 64;
 /// Rays per cell of the third picture; those before have none.
 const FIRST_RAYS: usize = 16;
 
-/// Of the elements that the camera does not see, one in so many tells the ambient term of the first picture. Of 40,000 these are
-/// 2,500, whose mean is known to some percent; with many more the picture would wait for what it does not show.
-const EACH: usize = 16;
+/// Of the elements that the camera does not see, one for the area of so many tells how much light they reflect in the first
+/// picture. Of 40,000 these are 2,500, whose mean is known to some percent; more would make the picture wait for what it does not
+/// show.
+const EACH: f64 = 16.0;
 
 /// What a camera sees, for pictures of solutions as they stand.
 pub struct Glimpse {
@@ -64,28 +67,48 @@ impl Glimpse {
                 elements.of_cell(cell).for_each(|element| is_seen[element as usize] = true);
             }
         }
-        let asked: Vec<u32> = (0..elements.len()).filter(|e| is_seen[*e] || e % EACH == 0).map(|e| e as u32).collect();
+        let mut stands_for: Vec<f64> =
+            area.iter().zip(&is_seen).map(|(a, seen)| if *seen { *a } else { 0.0 }).collect();
+        let unseen = || (0..elements.len()).filter(|e| !is_seen[*e]);
+        let step = EACH * unseen().map(|e| area[e]).sum::<f64>() / unseen().count().max(1) as f64;
+        // One in each stretch of the area, at a place of its own: at equal ones, the fronts of sheets alone might be met.
+        let (mut end, mut stretch) = (0.0, 0u32);
+        let place = |stretch: u32| (f64::from(stretch) + f64::from(unit(hash(stretch)))) * step;
+        for e in unseen() {
+            end += area[e];
+            while place(stretch) < end {
+                stands_for[e] += step;
+                stretch += 1;
+            }
+        }
+        let flat = |e: u32| (e, [elements.normal(mesh, e); 3]);
+        let asked: Vec<(u32, [DVec3; 3])> =
+            (0..elements.len() as u32).filter(|e| stands_for[*e as usize] > 0.0).map(flat).collect();
         let exposure = Exposure::default();
         let all = ElementReceivers { mesh, elements: &elements, exposure: &exposure };
-        let receivers = Asked { all: &all, of: &asked };
+        let receivers = ShadedReceivers { all: &all, shaded: &asked };
         let columns = luminaires.columns(tracer, &receivers, &options.shadowing, &Watch(monitor))?;
 
-        // What arrives at a sheet leaves it on both sides.
+        // What arrives at a sheet leaves it on both sides. Only direct light has to be asked for; the rest is known of all.
         let (mut given, mut kept) = ([0.0; 3], [0.0; 3]);
-        for (i, e) in asked.iter().map(|e| *e as usize).enumerate() {
-            let stands_for = area[e] * if is_seen[e] { 1.0 } else { EACH as f64 };
-            let passed = sheets.passed(e).map_or([0.0; 3], |(_, tau)| tau);
+        let back = |e: usize, band: usize| {
+            f64::from(reflectance[e][band] + sheets.passed(e).map_or(0.0, |(_, tau)| tau[band]))
+        };
+        for e in 0..elements.len() {
+            for band in 0..3 {
+                given[band] += area[e] * f64::from(exitance[e][band] - luminaires.promoted[e][band]);
+                kept[band] += area[e] * (1.0 - back(e, band));
+            }
+        }
+        for (i, e) in asked.iter().map(|(e, _)| *e as usize).enumerate() {
             let direct = columns.seen(i);
             for band in 0..3 {
-                let back = f64::from(reflectance[e][band] + passed[band]);
-                let own = f64::from(exitance[e][band] - luminaires.promoted[e][band]);
-                given[band] += stands_for * (own + back * f64::from(direct[band]));
-                kept[band] += stands_for * (1.0 - back);
+                given[band] += stands_for[e] * back(e, band) * f64::from(direct[band]);
             }
         }
         let ambient: Bands = std::array::from_fn(|k| if kept[k] > 0.0 { (given[k] / kept[k]) as f32 } else { 0.0 });
         let (mut irradiance, mut weight) = (vec![[0f32; 3]; elements.len()], vec![0.0; elements.len()]);
-        for (i, e) in asked.iter().map(|e| *e as usize).enumerate() {
+        for (i, e) in asked.iter().map(|(e, _)| *e as usize).enumerate() {
             let direct = columns.mean(i);
             irradiance[e] = std::array::from_fn(|band| direct[band] + ambient[band]);
             weight[e] = area[e];
@@ -104,38 +127,6 @@ impl Glimpse {
             field.at(seen.place.triangle as usize, seen.uv, seen.side)
         };
         self.view.picture(&self.view.seen.par_iter().map(light).collect::<Vec<_>>())
-    }
-}
-
-/// Some of the elements.
-struct Asked<'a> {
-    all: &'a ElementReceivers<'a>,
-    of: &'a [u32],
-}
-
-impl Receivers for Asked<'_> {
-    fn len(&self) -> usize {
-        self.of.len()
-    }
-
-    fn site(&self, i: usize) -> Option<Site> {
-        self.all.site(self.of[i] as usize)
-    }
-
-    fn buried(&self, tracer: &Tracer, place: &Place, seed: u32) -> bool {
-        self.all.buried(tracer, place, seed)
-    }
-
-    fn places(&self, i: usize, wanted: u32) -> u32 {
-        self.all.places(self.of[i] as usize, wanted)
-    }
-
-    fn near(&self, i: usize) -> Option<f64> {
-        self.all.near(self.of[i] as usize)
-    }
-
-    fn seed(&self, i: usize) -> u32 {
-        self.all.seed(self.of[i] as usize)
     }
 }
 
