@@ -83,13 +83,18 @@ fn a_lamp_over_a_black_floor_is_its_closed_form() {
     let session = lit(black_room(), 500);
     for (height, border) in [(0.75, 0.5), (0.0, 0.0), (1.2, 0.8)] {
         let reading = read(&session, over(0, height, border)).unwrap();
-        let mut size = reading.size;
+        let mut size = reading.figures.size;
         size.sort_by(f64::total_cmp);
         assert!((size[0] - (4.0 - 2.0 * border)).abs() < 1e-9 && (size[1] - (6.0 - 2.0 * border)).abs() < 1e-9);
         // EN 12464-1: p = 0.2 · 5^lg d.
         let p = 0.2 * 5f64.powf(size[1].log10());
-        assert!(reading.cell.iter().all(|cell| *cell <= p + 1e-9 && *cell > 0.8 * p), "{:?} at most {p}", reading.cell);
-        let cells = reading.size[0] * reading.size[1] / (reading.cell[0] * reading.cell[1]);
+        assert!(
+            reading.figures.cell.iter().all(|cell| *cell <= p + 1e-9 && *cell > 0.8 * p),
+            "{:?} at most {p}",
+            reading.figures.cell
+        );
+        let cells =
+            reading.figures.size[0] * reading.figures.size[1] / (reading.figures.cell[0] * reading.figures.cell[1]);
         assert_eq!(reading.points.len(), cells.round() as usize);
         let mut sum = 0.0;
         for point in &reading.points {
@@ -107,9 +112,12 @@ fn a_lamp_over_a_black_floor_is_its_closed_form() {
             sum += wanted;
         }
         let lux = |of: fn(f32, f32) -> f32| reading.points.iter().map(|point| point.lux).reduce(of).unwrap();
-        assert!((f64::from(reading.mean) / (sum / reading.points.len() as f64) - 1.0).abs() < 1e-5);
-        assert_eq!((reading.least, reading.most), (lux(f32::min), lux(f32::max)));
-        assert!((reading.uniformity - reading.least / reading.mean).abs() < 1e-6 && !reading.is_coarse);
+        assert!((f64::from(reading.figures.mean) / (sum / reading.points.len() as f64) - 1.0).abs() < 1e-5);
+        assert_eq!((reading.figures.least, reading.figures.most), (lux(f32::min), lux(f32::max)));
+        assert!(
+            (reading.figures.uniformity - reading.figures.least / reading.figures.mean).abs() < 1e-6
+                && !reading.figures.is_coarse
+        );
     }
 }
 
@@ -128,7 +136,12 @@ fn a_furnace_is_uniform_in_the_air() {
         for point in &reading.points {
             assert!((point.lux - 200.0).abs() < 0.05, "{point:?}");
         }
-        assert!(reading.uniformity > 0.9997 && reading.error < 1e-4, "{} {}", reading.uniformity, reading.error);
+        assert!(
+            reading.figures.uniformity > 0.9997 && reading.figures.error < 1e-4,
+            "{} {}",
+            reading.figures.uniformity,
+            reading.figures.error
+        );
     }
 }
 
@@ -166,7 +179,7 @@ fn points_keep_off_things_and_walls() {
     let chest = session.model().objects.iter().find(|object| object.name == "chest").unwrap().id.0;
     let on_it = read(&session, over(chest, 0.0, 0.0)).unwrap();
     assert!(on_it.points.iter().all(|p| is_in_chest(p.position.into()) && (p.position[1] - 0.9).abs() < 1e-9));
-    assert!((on_it.size[0] - 1.2).abs() < 1e-9 && on_it.least > 10.0, "{on_it:?}");
+    assert!((on_it.figures.size[0] - 1.2).abs() < 1e-9 && on_it.figures.least > 10.0, "{on_it:?}");
 
     let refused = |question| read(&session, question).unwrap_err();
     assert_eq!(refused(over(0, 5.0, 0.5)), PlaneError::NoPoint, "above the ceiling");
@@ -249,10 +262,10 @@ fn agrees_with_measure() {
             sum += wanted;
         }
         let off = (square / whole).sqrt();
-        let mean = f64::from(reading.mean) * points.len() as f64 / sum - 1.0;
+        let mean = f64::from(reading.figures.mean) * points.len() as f64 / sum - 1.0;
         assert!(measured.achieved && points.len() >= 10);
         // Measured: 0.0006 and 0.0003 under lamps, 0.011 and 0.0014 by the window, of which points tell 0.019.
-        let told = f64::from(reading.error);
+        let told = f64::from(reading.figures.error);
         assert!(off < 0.02 && mean.abs() < 0.01, "{name}: {off} {mean}");
         assert!(told < 0.05 && off < 2.0 * told + 0.002, "{name}: {off} {mean}, told {told}");
     }
@@ -276,7 +289,7 @@ fn edits_are_followed() {
     }
     finish(&mut session);
     let after = carry_on(&session, &mut plane).unwrap();
-    assert!(after.mean < 0.9 * before.mean, "{} {}", after.mean, before.mean);
+    assert!(after.figures.mean < 0.9 * before.figures.mean, "{} {}", after.figures.mean, before.figures.mean);
 
     let mut fresh =
         Session::new(scene, &SessionOptions { elements: 1500, rays: 256, ..SessionOptions::default() }).unwrap();

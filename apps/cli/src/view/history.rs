@@ -105,14 +105,8 @@ pub fn targets(edit: &Edit) -> Vec<Target> {
 
 /// What people call an edit.
 pub fn label(edit: &Edit, model: &Model) -> String {
-    let object = |id: &ObjectId| {
-        let named = model.objects.iter().find(|object| object.id == *id).map(|object| object.name.as_str());
-        named.filter(|name| !name.is_empty()).map_or_else(|| format!("object {}", id.0 + 1), str::to_owned)
-    };
-    let light = |id: &LightId| {
-        let named = model.lights.iter().find(|light| light.id == *id).map(|light| light.name.as_str());
-        named.filter(|name| !name.is_empty()).map_or_else(|| format!("light {}", id.0 + 1), str::to_owned)
-    };
+    let object = |id: &ObjectId| object_name(*id, model);
+    let light = |id: &LightId| light_name(*id, model);
     match edit {
         Edit::Light { light: id, .. } => format!("dim {}", light(id)),
         Edit::MoveLight { light: id, .. } => format!("move {}", light(id)),

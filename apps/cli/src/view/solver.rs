@@ -520,15 +520,7 @@ impl Solver {
                 .iter()
                 .map(|p| [p.position[0], p.position[1], p.position[2], p.lux.into()])
                 .collect(),
-            size: reading.size,
-            cell: reading.cell,
-            axes: reading.axes,
-            is_coarse: reading.is_coarse,
-            least: reading.least,
-            mean: reading.mean,
-            most: reading.most,
-            uniformity: reading.uniformity,
-            error: reading.error,
+            figures: reading.figures,
             edits: self.edits,
             is_done: self.is_done,
         });

@@ -12,7 +12,7 @@ use super::board::{CHUNK, LightChunk};
 use axum::body::Bytes;
 use glam::{DVec2, DVec3};
 use half::f16;
-use radiosity::session::{Edit, Layer, LightId, ModelLight, ModelObject, ObjectId, PlaneQuestion};
+use radiosity::session::{Edit, Layer, LightId, ModelLight, ModelObject, ObjectId, PlaneFigures, PlaneQuestion};
 use radiosity::{Bands, Scene, Surface, Texture, TextureRef, Wrap};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
@@ -218,17 +218,8 @@ pub struct ProbeAnswer {
 pub struct PlaneAnswer {
     /// Place in the scene, metres, and illuminance, lx.
     pub points: Vec<[f64; 4]>,
-    pub size: [f64; 2],
-    pub cell: [f64; 2],
-    /// Unit vectors along the sides.
-    pub axes: [[f64; 3]; 2],
-    pub is_coarse: bool,
-    pub least: f32,
-    pub mean: f32,
-    pub most: f32,
-    pub uniformity: f32,
-    /// Standard error of a point over the mean.
-    pub error: f32,
+    #[serde(flatten)]
+    pub figures: PlaneFigures,
     /// Edits that are in it.
     pub edits: u64,
     /// Whether the light will stay as it is.

@@ -13,7 +13,8 @@ pub const MOST_EDITS: usize = 4096;
 /// Most lights of a session, those that were taken away counted: numbers are never given anew.
 pub const MOST_LIGHTS: usize = 4096;
 
-/// Most intensity of a light that is added or changed, cd or lx: what files may have, so that every change of a lamp of a file can be taken back.
+/// Most intensity of a light that is added or changed, cd or lx: what files may have, so that every change of a lamp of a file
+/// can be taken back.
 pub const MOST_INTENSITY: f32 = 1e12;
 
 /// Largest half angle of a spot, radians: a right angle, with the rounding that files may have.

@@ -46,7 +46,7 @@ mod state;
 
 pub use edit::{Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
-pub use plane::{Plane, PlaneError, PlanePoint, PlaneQuestion, PlaneReading};
+pub use plane::{Plane, PlaneError, PlaneFigures, PlanePoint, PlaneQuestion, PlaneReading};
 
 use crate::Error;
 use display::{Display, Weights};

@@ -28,6 +28,9 @@ const FLAT: f64 = 1e-3;
 /// What rises so far above the floor is a wall, even if it could be moved; a cupboard, and no desk.
 const WALL: f64 = 2.0;
 
+/// An object that is less than this part of the scene wide is taken for one that can be moved.
+const MOVABLE: f64 = 0.5;
+
 /// Walls are looked for as high as the plane, and above skirtings and thresholds.
 const SKIRTING: f64 = 0.1;
 
@@ -114,6 +117,13 @@ pub struct PlanePoint {
 pub struct PlaneReading {
     /// Its points, row by row.
     pub points: Vec<PlanePoint>,
+    /// What they are together.
+    pub figures: PlaneFigures,
+}
+
+/// A plane as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PlaneFigures {
     /// Sides of the plane without the zone along its border, metres.
     pub size: [f64; 2],
     /// Sides of a cell, metres.
@@ -412,7 +422,7 @@ impl Session {
         let square = points.iter().map(|point| f64::from(point.error).powi(2)).sum::<f64>() / count;
         let least = points.iter().map(|point| point.lux).fold(f32::INFINITY, f32::min);
         let over = |x: f64| if mean > 0.0 { (x / mean) as f32 } else { 0.0 };
-        Ok(PlaneReading {
+        let figures = PlaneFigures {
             size: [0, 1].map(|k| layout.cell[k] * layout.counts[k] as f64),
             cell: layout.cell.to_array(),
             axes: layout.axes.map(|axis| axis.to_array()),
@@ -422,10 +432,7 @@ impl Session {
             most: points.iter().map(|point| point.lux).fold(0.0, f32::max),
             uniformity: over(f64::from(least)),
             error: over(square.sqrt()),
-            points,
-        })
+        };
+        Ok(PlaneReading { points, figures })
     }
 }
-
-/// An object that is less than this part of the scene wide is taken for one that can be moved.
-const MOVABLE: f64 = 0.5;
