@@ -7,7 +7,6 @@ use crate::Error;
 use crate::displayed::{Displayed, Screen, Shown};
 use crate::division::{Optics, Sheets, divided};
 use crate::equation::{self, Matrix, RANDOM_TOLERANCE, TABLE_TOLERANCE, Task, single};
-use crate::mean_path::area;
 use crate::monitor::{Hurry, Monitor, Stages, Watch, is_over};
 use radiosity_scene::{Bands, Elements, Scene, SkyPatches};
 use radiosity_solve::{DiffuseResponse, Info, Params, Solver};
@@ -631,5 +630,5 @@ fn memory_error(elements: usize, needed: usize, options: &SolveOptions) -> Error
 
 /// Width of a cell: as asked, or such that the scene's area makes as many as asked.
 pub(crate) fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
-    options.element_size.unwrap_or_else(|| (2.0 * area(tracer.mesh) / options.cells.max(1) as f64).sqrt())
+    options.element_size.unwrap_or_else(|| (2.0 * tracer.mesh.whole_area() / options.cells.max(1) as f64).sqrt())
 }

@@ -2,8 +2,9 @@
 //!
 //! Pairs are judged in clusters first (`walk`, `cluster`, `shaft`): facing away, proven blocked, proven clear, or mixed. Clear
 //! ones take cubature or the closed form (`clear`); mixed ones the exact visible factor from points of one part (`mixed`,
-//! `visible`), of which neighbours in a leaf share what they can. The exchange area A_i F_ij is stored once per pair, so reciprocity holds by storage; what the rows lack
-//! of one is therefore an honest measure of the error, and is reported before any repair (`closure`).
+//! `visible`), of which neighbours in a leaf share what they can. The exchange area A_i F_ij is stored once per pair, so
+//! reciprocity holds by storage; what the rows lack of one is therefore an honest measure of the error, and is reported before
+//! any repair (`closure`).
 
 mod adaptive;
 mod body;
