@@ -40,8 +40,9 @@ impl Default for MeasureOptions {
 /// over its rays.
 const LOOKED_UP_CELLS: [f64; 2] = [50_000.0, 5_000.0];
 
-/// Cells along the mean path of light at least, however many rooms there are: see what [`crate::bake`] says of its own.
-const CELLS_ON_PATH: f64 = 1.5;
+/// Cells along the mean path of light at least, however many rooms there are: a gather over wider ones is a path tracer. With 1.5
+/// points in a furnished office are −0.55 % off at 2 % and 4 %, by finer cells in which direct light may vary as much.
+const CELLS_ON_PATH: f64 = 1.0;
 
 /// Variation of direct light within an element that is looked up, by the error asked.
 const VARIATION: f64 = 5.0;
