@@ -1,7 +1,7 @@
 //! What a lightmap is drawn on: the faces that carry light, laid flat, and how texels are lit. Drawn again with more texels,
 //! it keeps what it knows: only where the map before was rough are texels lit anew.
 
-use crate::answer::Station;
+use crate::answer::{Answer, Station};
 use crate::faces::{Face, faces, is_hidden};
 use crate::judge::{Judge, WrittenRound};
 use crate::{Error, Monitor, Solution, stations};
@@ -21,6 +21,9 @@ const EDGE_CONTRAST: f64 = 0.1;
 /// How many points: stairs of 1/16 are below what a display shows.
 const EDGE_POINTS: u32 = 16;
 
+/// A texel that keeps less of its own light than this when it is pooled has the same indirect light at all its points.
+const SMOOTH: f32 = 0.5;
+
 /// Points that are lit at a time.
 const PORTION: usize = 1 << 18;
 
@@ -35,6 +38,14 @@ pub(crate) struct Canvas<'b, 'a> {
     /// Edges across which light is continuous: the two faces share both smooth vertices.
     seams: Vec<SharedEdge>,
     index: HashMap<(usize, Side), usize>,
+}
+
+/// Light of texels, lx per band; the indirect part is not a number inside solids.
+struct Lit {
+    direct: Vec<Bands>,
+    indirect: Vec<Bands>,
+    /// Standard error of the indirect part; nothing where it is not gathered.
+    noise: Vec<Bands>,
 }
 
 /// A canvas with its light.
@@ -100,8 +111,19 @@ impl<'b, 'a> Canvas<'b, 'a> {
                 None => vec![None; texels.len()],
             };
             let fresh: Vec<Texel> = texels.iter().zip(&known).filter(|(_, e)| e.is_none()).map(|(t, _)| *t).collect();
-            let mut fresh = self.light(&fresh, 1, judge, monitor)?.into_iter();
             lit += fresh.len();
+            let answer = self.light(&fresh, judge, monitor)?;
+            let at = |t: &Texel| usize::from(t.y) * size[0] as usize + usize::from(t.x);
+            let mut gathered = HashMap::new();
+            let mut indirect = answer.indirect;
+            if judge.gathers() {
+                let pooled = atlas.pooled(page, &fresh, &indirect, &answer.noise);
+                indirect = pooled.iter().map(|p| p.light).collect();
+                // Where that is smooth, points of a texel differ by the edges of shadows alone.
+                let smooth = fresh.iter().zip(&pooled).filter(|(_, p)| p.own < SMOOTH);
+                gathered.extend(smooth.map(|(texel, p)| (at(texel), p.light)));
+            }
+            let mut fresh = answer.direct.iter().zip(&indirect).map(|(d, h)| [0, 1, 2].map(|k| d[k] + h[k]));
             let mut values: Vec<Bands> = known.iter().filter_map(|e| e.or_else(|| fresh.next())).collect();
             let mut points = texels.clone();
             // What is known gets no more points: it counts twice.
@@ -118,12 +140,12 @@ impl<'b, 'a> Canvas<'b, 'a> {
                 }
                 // In portions, as they may be many times as many as the texels.
                 for some in more.chunks(PORTION) {
-                    values.extend(self.light(some, EDGE_POINTS, judge, monitor)?);
+                    let known: Vec<_> = some.iter().map(|texel| gathered.get(&at(texel)).copied()).collect();
+                    values.extend(self.light_edges(some, &known, judge, monitor)?);
                 }
                 points.extend(more);
             }
             let picture = fill(*size, &points, &values);
-            let at = |t: &Texel| usize::from(t.y) * size[0] as usize + usize::from(t.x);
             let mut shows = vec![false; picture.len()];
             for (point, _) in points.iter().zip(&values).filter(|(_, e)| e[0].is_finite()) {
                 shows[at(point)] = true;
@@ -157,19 +179,44 @@ impl<'b, 'a> Canvas<'b, 'a> {
     }
 
     /// Every texel is lit like a point of the surface; those inside solids are left to their neighbours.
-    fn light(&self, texels: &[Texel], of: u32, judge: &Judge, monitor: &dyn Monitor) -> Result<Vec<Bands>, Error> {
-        let solution = self.solution;
-        let station = |texel: &Texel| {
-            let face = self.faces[texel.triangle as usize];
-            stations::station(solution.tracer(), face.triangle, face.mesh_uv(texel.uv.as_dvec2()), face.side)
-        };
-        let at: Vec<Station> = texels.iter().map(station).collect();
-        let mut values = judge.light(&at, of, monitor)?;
-        for (value, station) in values.iter_mut().zip(&at) {
-            if is_hidden(solution, station) {
-                *value = [f32::NAN; 3];
-            }
+    fn light(&self, texels: &[Texel], judge: &Judge, monitor: &dyn Monitor) -> Result<Lit, Error> {
+        let at = self.stations(texels);
+        let Answer { irradiance, direct, standard_error } = judge.light(&at, 1, monitor)?;
+        let indirect = irradiance.iter().zip(&direct).zip(&at).map(|((e, d), station)| {
+            if is_hidden(self.solution, station) { [f32::NAN; 3] } else { std::array::from_fn(|k| e[k] - d[k]) }
+        });
+        Ok(Lit { indirect: indirect.collect(), direct, noise: standard_error })
+    }
+
+    /// Further points of texels, whose indirect light may be known.
+    fn light_edges(
+        &self,
+        points: &[Texel],
+        known: &[Option<Bands>],
+        judge: &Judge,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Bands>, Error> {
+        let at = self.stations(points);
+        let (smooth, rest): (Vec<usize>, Vec<usize>) = (0..points.len()).partition(|i| known[*i].is_some());
+        let of = |chosen: &[usize]| -> Vec<Station> { chosen.iter().map(|i| at[*i]).collect() };
+        let mut values = vec![[f32::NAN; 3]; points.len()];
+        for (i, direct) in smooth.iter().zip(judge.direct(&of(&smooth), EDGE_POINTS, monitor)?) {
+            values[*i] = std::array::from_fn(|k| direct[k] + known[*i].map_or(0.0, |light| light[k]));
+        }
+        for (i, light) in rest.iter().zip(judge.light(&of(&rest), EDGE_POINTS, monitor)?.irradiance) {
+            values[*i] = light;
+        }
+        for (value, _) in values.iter_mut().zip(&at).filter(|(_, station)| is_hidden(self.solution, station)) {
+            *value = [f32::NAN; 3];
         }
         Ok(values)
+    }
+
+    fn stations(&self, texels: &[Texel]) -> Vec<Station> {
+        let station = |texel: &Texel| {
+            let face = self.faces[texel.triangle as usize];
+            stations::station(self.solution.tracer(), face.triangle, face.mesh_uv(texel.uv.as_dvec2()), face.side)
+        };
+        texels.iter().map(station).collect()
     }
 }

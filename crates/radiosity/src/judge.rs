@@ -4,11 +4,12 @@
 //! The square of the error as read back is the solution's own, at the points that are lit, plus what is lost between them.
 //! Finer texels lessen the second alone; so where the first leaves too little room, points are lit with more rays before.
 
-use crate::answer::Station;
+use crate::answer::{Answer, Station};
 use crate::bake::{Baked, GATHERS, gather_rays};
 use crate::measure::{brought_nothing, certify, most_paths};
 use crate::{Error, Indirect, Monitor, Solution, stations};
 use radiosity_scene::{Bands, luminance};
+use radiosity_trace::Place;
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor};
 use rayon::prelude::*;
@@ -33,8 +34,12 @@ pub(crate) fn is_stalled(rounds: &[WrittenRound]) -> bool {
     brought_nothing(&rounds.iter().map(|round| round.error).collect::<Vec<_>>())
 }
 
-/// Fewest shadow rays at a point that is one of many.
+/// Fewest shadow rays and gather rays at a point that is one of many.
 const LEAST_RAYS: u32 = 8;
+const LEAST_GATHER: usize = 8;
+
+/// Fewest gather rays at a point that shares with others: of small things there are few to share with.
+const LEAST_POOLED: usize = 64;
 
 /// One attempt at writing light so that it is read back as well as was asked.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -76,6 +81,8 @@ pub(crate) struct Judge<'b, 'a> {
     auditor: Auditor<'a>,
     gather: usize,
     shadowing: Shadowing,
+    /// How many times fewer rays do for points that are written: they share theirs with those around them.
+    pooled: usize,
     /// The solution's light at the places of the audit.
     at: Vec<Bands>,
     /// Further places where written light is compared with the solution, and its illuminance there.
@@ -87,8 +94,9 @@ pub(crate) struct Judge<'b, 'a> {
 }
 
 impl<'b, 'a> Judge<'b, 'a> {
-    pub fn new(baked: &'b Baked<'a>) -> Judge<'b, 'a> {
+    pub fn new(baked: &'b Baked<'a>, pooled: usize) -> Judge<'b, 'a> {
         Judge {
+            pooled,
             baked,
             auditor: baked.auditor.clone(),
             gather: baked.gather,
@@ -106,18 +114,59 @@ impl<'b, 'a> Judge<'b, 'a> {
         self.baked.watched.iter().chain(&self.more)
     }
 
-    /// The solution's light at stations, of which `of` together make the mean that counts, and share their rays.
+    /// The solution's light at stations that are written, of which `of` together make the mean that counts, and share their
+    /// rays.
     ///
     /// # Errors
     /// [`Error::Stopped`].
-    pub fn light(&self, stations: &[Station], of: u32, monitor: &dyn Monitor) -> Result<Vec<Bands>, Error> {
-        let indirect = match self.gather {
-            0 => Indirect::Field(&self.baked.field),
-            rays => Indirect::Gather { rays: (rays / of as usize).max(8) },
-        };
-        let rays = if of > 1 { (self.shadowing.rays / of).max(LEAST_RAYS) } else { self.shadowing.rays };
-        let shadowing = Shadowing { rays, ..self.shadowing };
-        Ok(self.baked.solution.at(stations, indirect, &shadowing, monitor)?.irradiance)
+    pub fn light(&self, stations: &[Station], of: u32, monitor: &dyn Monitor) -> Result<Answer, Error> {
+        let gather = if self.gathers() { (self.written().0 / of as usize).max(LEAST_GATHER) } else { 0 };
+        self.lit(stations, gather, &self.shared(of), monitor)
+    }
+
+    /// The direct part of that light.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn direct(&self, stations: &[Station], of: u32, monitor: &dyn Monitor) -> Result<Vec<Bands>, Error> {
+        let places: Vec<Place> = stations.iter().map(|s| s.place).collect();
+        self.baked.solution.direct_at(&places, &self.shared(of), monitor)
+    }
+
+    /// Whether indirect light is gathered at each point, and so has noise of its own.
+    pub fn gathers(&self) -> bool {
+        self.gather > 0
+    }
+
+    fn lit(
+        &self,
+        stations: &[Station],
+        gather: usize,
+        shadowing: &Shadowing,
+        monitor: &dyn Monitor,
+    ) -> Result<Answer, Error> {
+        let field = Indirect::Field(&self.baked.field);
+        let indirect = if gather == 0 { field } else { Indirect::Gather { rays: gather } };
+        self.baked.solution.at(stations, indirect, shadowing, monitor)
+    }
+
+    /// Light at places where what is written is read back.
+    fn at_places(&self, places: &[Station], monitor: &dyn Monitor) -> Result<Vec<Bands>, Error> {
+        Ok(self.lit(places, self.gather, &self.shadowing, monitor)?.irradiance)
+    }
+
+    /// Gather and shadow rays of a point that is written, and no other with it.
+    fn written(&self) -> (usize, u32) {
+        let first = gather_rays(self.baked.error).min(LEAST_POOLED).max(self.baked.gather);
+        let shadow_rays = (self.shadowing.rays / self.pooled as u32).max(self.baked.shadowing.rays);
+        ((self.gather / self.pooled).max(first), shadow_rays)
+    }
+
+    /// Shadow rays of each of so many points.
+    fn shared(&self, of: u32) -> Shadowing {
+        let rays = self.written().1;
+        let rays = if of > 1 { (rays / of).max(LEAST_RAYS) } else { rays };
+        Shadowing { rays, ..self.shadowing }
     }
 
     /// Of light that is `read` back at places. Where that seems to be worse than what was asked, and the solution is not,
@@ -139,7 +188,7 @@ impl<'b, 'a> Judge<'b, 'a> {
             self.is_close = true;
         }
         if self.light.is_empty() {
-            let light = self.light(&self.more, 1, monitor)?;
+            let light = self.at_places(&self.more, monitor)?;
             self.light = light.iter().map(|e| f64::from(luminance(*e))).collect();
         }
         let apart = |(station, h): (&Station, &f64)| (f64::from(luminance(read(station))) - h).powi(2);
@@ -176,22 +225,24 @@ impl<'b, 'a> Judge<'b, 'a> {
         Ok(Some(Goal { left: (q * q).min(AIM), relight }))
     }
 
-    /// Lights points with more rays, once, if the solution's bound is more than `enough`. Answers whether it does now.
+    /// Looks at places with more rays, once, if the solution's bound is more than `enough`. Answers whether points that are written
+    /// get more of them, too.
     fn look_closer(&mut self, mut upper: f64, enough: f64, monitor: &dyn Monitor) -> Result<bool, Error> {
         if upper <= enough || std::mem::replace(&mut self.is_relit, true) {
             return Ok(false);
         }
-        let mut is_better = false;
+        let written = |judge: &Judge| (judge.gathers(), judge.written());
+        let (mut is_better, before) = (false, written(self));
         let (mut gather, mut shadowing) = (self.gather, self.shadowing);
         for _ in 0..GATHERS {
             gather = (2 * gather).max(gather_rays(self.baked.error));
             shadowing.rays *= 2;
-            let before = (self.gather, self.shadowing);
+            let kept = (self.gather, self.shadowing);
             (self.gather, self.shadowing) = (gather, shadowing);
-            let at = self.light(&self.baked.watched, 1, monitor)?;
+            let at = self.at_places(&self.baked.watched, monitor)?;
             let audit = self.certify(&at, enough, monitor)?;
             if audit.upper >= upper {
-                (self.gather, self.shadowing) = before;
+                (self.gather, self.shadowing) = kept;
                 break;
             }
             (self.at, upper, is_better) = (at, audit.upper, true);
@@ -202,7 +253,7 @@ impl<'b, 'a> Judge<'b, 'a> {
         if is_better {
             self.light.clear();
         }
-        Ok(is_better)
+        Ok(written(self) != before)
     }
 
     /// What the referee says of the solution's light `at` its places.

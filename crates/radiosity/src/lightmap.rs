@@ -76,8 +76,14 @@ const MOST_GROWTH: f64 = 20.0;
 /// How many times as many texels as at first are lit in a round at most: it takes as many times as long then.
 const MOST_LIT: f64 = 3.0;
 
+/// How much more of the squared error a round leaves if it would light too many texels.
+const STEP_BACK: f64 = 1.5;
+
 /// Rounds after the first map: two or three of finer texels, one to mend what the estimate had wrong.
 const ROUNDS: usize = 4;
+
+/// How many times the rays texels that pool theirs are worth at least, on surfaces that are wider than a few of them.
+const POOLED: usize = 4;
 
 /// Texels of so many charts where no density is asked for.
 pub(crate) fn automatic_texels(charts: usize) -> f64 {
@@ -109,7 +115,7 @@ pub fn lightmap(
     if texels > most {
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
-    let mut judge = Judge::new(baked);
+    let mut judge = Judge::new(baked, POOLED);
     let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
     let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
     let mut rounds = vec![drawn.round(&audit)];
@@ -128,7 +134,10 @@ pub fn lightmap(
             break;
         }
         let lit = |step: &Allotment| if goal.relight { step.texels } else { step.rough };
-        let Some(step) = allot(goal.left.max(STEP)).filter(|step| lit(step) <= MOST_LIT * budget) else { break };
+        // As far as a round may go; if not all the way, it is not the last.
+        let steps = std::iter::successors(Some(goal.left.max(STEP)), |left| Some(STEP_BACK * left))
+            .take_while(|left| *left < 1.0);
+        let Some(step) = steps.filter_map(allot).find(|step| lit(step) <= MOST_LIT * budget) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
         drawn = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;

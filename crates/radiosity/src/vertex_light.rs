@@ -45,7 +45,7 @@ const ROUNDS: usize = 4;
 pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight, Error> {
     let solution = &baked.solution;
     let faces = faces(solution);
-    let mut judge = Judge::new(baked);
+    let mut judge = Judge::new(baked, 1);
     let mut division: Vec<u32> =
         (0..solution.tracer().mesh.triangles.len()).map(|t| solution.elements.division(t)).collect();
     let mut known = HashMap::new();
@@ -268,7 +268,7 @@ impl Lattice {
     ) -> Result<usize, Error> {
         let new: Vec<usize> = (0..self.at.len()).filter(|i| !known.contains_key(&self.spots[*i])).collect();
         let stations: Vec<Station> = new.iter().map(|i| self.at[*i]).collect();
-        let light = judge.light(&stations, 1, monitor)?;
+        let light = judge.light(&stations, 1, monitor)?.irradiance;
         let hidden: Vec<bool> = stations.par_iter().map(|station| is_hidden(solution, station)).collect();
         known.extend(new.iter().zip(light.iter().zip(&hidden)).map(|(i, (e, h))| (self.spots[*i], (!h).then_some(*e))));
         let light: Vec<Option<Bands>> = self.spots.iter().map(|spot| known[spot]).collect();
