@@ -1,5 +1,6 @@
 //! Frames: parallelograms and triangles, what convex polygons are integrated over.
 
+use crate::pair::gauss::gauss;
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -74,9 +75,8 @@ impl Frame {
         };
         let mut rule = SmallVec::new();
         if self.is_square {
-            for [x, wx] in GAUSS[order - 1] {
-                let points = GAUSS[order - 1].iter();
-                rule.extend(points.map(|[y, wy]| at(0.5 * (1.0 + x), 0.5 * (1.0 + y), 0.25 * wx * wy)));
+            for [x, of_x] in gauss(order) {
+                rule.extend(gauss(order).iter().map(|[y, of_y]| at(*x, *y, of_x * of_y)));
             }
             return rule;
         }
@@ -96,19 +96,6 @@ impl Frame {
         rule
     }
 }
-
-/// Nodes of Gauss and Legendre on [−1, 1] with weights that sum to two.
-const GAUSS: [&[[f64; 2]]; ORDERS] = [
-    &[[0.0, 2.0]],
-    &[[-0.577_350_269_189_625_8, 1.0], [0.577_350_269_189_625_8, 1.0]],
-    &[[-0.774_596_669_241_483_4, 5.0 / 9.0], [0.0, 8.0 / 9.0], [0.774_596_669_241_483_4, 5.0 / 9.0]],
-    &[
-        [-0.861_136_311_594_052_6, 0.347_854_845_137_453_85],
-        [-0.339_981_043_584_856_26, 0.652_145_154_862_546_1],
-        [0.339_981_043_584_856_26, 0.652_145_154_862_546_1],
-        [0.861_136_311_594_052_6, 0.347_854_845_137_453_85],
-    ],
-];
 
 /// A symmetric rule on triangles.
 struct Triangle {
