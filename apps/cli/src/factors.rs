@@ -1,5 +1,6 @@
 //! `radiosity factors`: view factors between surfaces.
 
+use crate::blind::{Why, blind};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::{Failure, Global, numbers};
@@ -8,7 +9,7 @@ use radiosity::io::vs3::NoRow;
 use radiosity::io::{FactorFormat, FactorRows, FactorTable, Grouping, LoadOptions, Vs3, enclosure_of, load_enclosure};
 use radiosity::transport::row::{MOST_CELLS, RowMethod};
 use radiosity::transport::{FormFactorMethod, FormFactors};
-use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Severity, counted};
+use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Missed, Severity, counted};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -450,20 +451,22 @@ fn rows_of_vs3(vs3: &Vs3, enclosure: &Enclosure, is_script_f: bool) -> Vec<Strin
     lines
 }
 
+/// What was asked and not reached, if surfaces as they go out are not as exact either.
+fn missed(found: &Factors) -> Option<Missed> {
+    found.missed.filter(|missed| found.largest_error.error > missed.asked)
+}
+
 /// What is doubtful about factors: worth a warning, whatever goes out.
 fn warnings(input: &Input, found: &Factors) -> Vec<String> {
     let name = |surface| name(&input.enclosure, surface);
     let mut lines = Vec::new();
-    if let Some(missed) = &found.missed {
-        let [from, to] = missed.largest.pair;
+    // Of surfaces that go out as exact as was asked, no more is told; else this is the one place where their error is.
+    if let Some(missed) = missed(found) {
         lines.push(format!(
-            "warning: the accuracy of {:e} was not reached: {} stated with larger errors, {:.2e} at most, from {} to {} \
-             (cut large surfaces into pieces, or allow more)",
+            "warning: the accuracy of {:e} was not reached between {} (cut large surfaces into pieces, or allow more): {}",
             missed.asked,
-            counted(missed.pairs, "pair of facets is", "pairs of facets are"),
-            missed.largest.error,
-            name(from),
-            name(to),
+            counted(missed.pairs, "pair of facets", "pairs of facets"),
+            largest_error(&input.enclosure, found),
         ));
     }
     if let Some(excess) = &found.excess {
@@ -506,23 +509,23 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
     let closure = &found.closure;
     let [low, high] = found.row_sums.map(unsigned_zero);
     let of = if table.is_script_f { "rows of F" } else { "rows" };
-    lines.push(format!("{of} sum to {low:.7} … {high:.7}, as found"));
+    let mut sums = format!("{of} sum to {low:.7} … {high:.7}, as found");
     if enclosure.is_closed || high > 1.0 + 1e-3 || low > 1.0 - 1e-2 {
-        lines.push(format!(
-            "closure: off by {:.1e} (RMS), at most {:.1e} at {}",
-            closure.rms,
-            closure.largest,
-            name(enclosure, closure.row)
-        ));
+        let worst = name(enclosure, closure.row);
+        sums += &format!("; off from one by {:.1e} (RMS), the most at {worst}", closure.rms);
     }
+    lines.push(sums);
+    lines.extend(blind_rows(enclosure, found));
     if arguments.method == FormFactorMethod::Adaptive {
-        lines.push(format!("reciprocal by storage; {}", largest_error(enclosure, found)));
+        lines.push("reciprocal by storage".to_owned());
     } else {
-        lines.push(largest_error(enclosure, found));
         lines.push(format!("reciprocity: off by {:.1e} at most", found.reciprocity));
         if !arguments.method.sees_occlusion() {
             lines.push(format!("{} does not see what stands between surfaces", arguments.method));
         }
+    }
+    if missed(found).is_none() {
+        lines.push(largest_error(enclosure, found));
     }
     if let Some(repair) = &found.repair {
         let moved = format!(
@@ -545,6 +548,20 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
         ));
     }
     lines
+}
+
+/// Which rows are all zero, and why.
+fn blind_rows(enclosure: &Enclosure, found: &Factors) -> Option<String> {
+    let blind = blind(&found.factors);
+    if blind.is_empty() {
+        return None;
+    }
+    let told = |surface: &usize| format!("{} ({})", name(enclosure, *surface), Why::of(enclosure, *surface).told());
+    let first: Vec<String> = blind.iter().take(LISTED).map(told).collect();
+    let more = blind.len() - first.len();
+    let rows = counted(blind.len(), "row is all zero: its surface sees", "rows are all zero: their surfaces see");
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    Some(format!("{rows} no other: {}{more}", first.join(", ")))
 }
 
 /// A sum as it is written with seven decimals: that of nothing is 0, and not −0 as IEEE 754 has it.
@@ -577,6 +594,7 @@ fn event(
         "event": "result", "method": arguments.method.name(), "surfaces": table.names, "areas": table.areas,
         "emittances": table.emittances, "facets": input.enclosure.facets.len(), "script_f": table.is_script_f,
         "closure": found.closure, "row_sums": found.row_sums, "reciprocity": found.reciprocity,
+        "zero_rows": blind(&found.factors).into_iter().map(named).collect::<Vec<_>>(),
         "largest_error": { "error": found.largest_error.error, "pair": found.largest_error.pair.map(named) },
         "accuracy_missed": found.missed.map(|m| json!({
             "asked": m.asked, "pairs_missed": m.pairs, "largest": m.largest.error, "pair": m.largest.pair.map(named),

@@ -1,6 +1,7 @@
 //! The `radiosity` program: a verb per file.
 
 mod bake;
+mod blind;
 mod check;
 mod compare;
 mod factors;

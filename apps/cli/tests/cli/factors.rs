@@ -131,9 +131,10 @@ fn an_accuracy_that_was_not_reached_and_rows_above_one_are_warned_of() {
     let missed = room.run(call);
     assert_eq!(missed.code, Some(0), "{missed:?}");
     assert!(
-        missed.err.contains("warning: the accuracy of 1e-30 was not reached: 1 pair of facets is stated"),
+        missed.err.contains("warning: the accuracy of 1e-30 was not reached between 1 pair of facets"),
         "{missed:?}"
     );
+    assert_eq!(missed.err.matches("errors of factors at most").count(), 1, "{missed:?}");
     let event = room.run(call.iter().chain(&["--json"])).result();
     assert!(event["accuracy_missed"]["largest"].as_f64().unwrap() > 1e-30, "{event}");
     let mut pair: Vec<&str> =
@@ -177,4 +178,21 @@ fn what_factors_do_not_do_is_told() {
     let run = room.run(["factors", "long.obj", "-o", "f.npz"]);
     assert!(run.code == Some(2) && run.err.contains("has 5000 characters"), "{run:?}");
     assert_eq!(room.run(["factors", "long.obj", "-q", "-o", "f.csv"]).code, Some(0));
+}
+
+/// A row of zeros looks like a fault until it is told why it is one: squares with a third between them that hides all, and one
+/// that looks away.
+#[test]
+fn rows_of_zeros_are_explained() {
+    let room = Room::new("factors-zeros");
+    let hidden = SQUARES.replace(".25", "0").replace(".75", "1");
+    room.write("hidden.vs3", &hidden.replace("End of data", "S 4 5 6 7 8 0 0 .5 away\nEnd of data"));
+    let run = room.run(["factors", "hidden.vs3"]);
+    assert!(run.code == Some(0) && run.err.contains("3 rows are all zero: their surfaces see no other: "), "{run:?}");
+    let why = "'floor' (covered or walled in), 'ceiling' (covered or walled in), 'away' (none faces it)";
+    assert!(run.err.contains(why), "{run:?}");
+    let event = room.run(["factors", "hidden.vs3", "--json"]).result();
+    assert_eq!(event["zero_rows"], serde_json::json!(["floor", "ceiling", "away"]), "{event}");
+    room.write("squares.vs3", SQUARES);
+    assert!(!room.run(["factors", "squares.vs3"]).err.contains("zero"));
 }

@@ -1,0 +1,46 @@
+//! Surfaces that see nothing: rows of a matrix of factors that are all zero, and why they are.
+
+use radiosity::transport::FormFactors;
+use radiosity::{Enclosure, Facet};
+
+/// Height above a plane that counts as none, relative to the extent of the scene: below what single precision leaves of
+/// coordinates.
+const FLAT: f64 = 1e-6;
+
+/// Why a surface sees nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Why {
+    /// There is no other surface before it that faces it.
+    Alone,
+    /// There is, but all of it is hidden: the surface is covered or walled in.
+    Hidden,
+}
+
+impl Why {
+    /// Why surface `blind` sees nothing: facets before each other that it yet sees nothing of are hidden.
+    pub fn of(enclosure: &Enclosure, blind: usize) -> Why {
+        let facets = || enclosure.facets.iter().zip(&enclosure.surface_of);
+        let size = enclosure.bounds().map_or(0.0, |[low, high]| low.distance(high));
+        let faces = |from: &Facet, to: &Facet| to.corners().iter().any(|corner| from.height(*corner) > FLAT * size);
+        let own = facets().filter(|(_, surface)| **surface as usize == blind);
+        for (facet, _) in own {
+            if facets().any(|(other, _)| faces(facet, other) && faces(other, facet)) {
+                return Why::Hidden;
+            }
+        }
+        Why::Alone
+    }
+
+    /// In words, after a name.
+    pub fn told(self) -> &'static str {
+        match self {
+            Why::Alone => "none faces it",
+            Why::Hidden => "covered or walled in",
+        }
+    }
+}
+
+/// The rows that are all zero.
+pub fn blind(factors: &FormFactors) -> Vec<usize> {
+    (0..factors.len()).filter(|row| factors.row(*row).all(|(_, value, _)| value == 0.0)).collect()
+}
