@@ -3,16 +3,18 @@
 //! (foci at its ends, half length 1) in which the function stays analytic (Trefethen 2008, "Is Gauss quadrature better
 //! than Clenshaw–Curtis?", SIAM Review 50).
 
-use std::sync::LazyLock;
+use std::sync::OnceLock;
 
 /// Most points of a rule: what the slowest user, the plain contour integral, may ask for.
 pub const MOST: usize = 64;
 
-static RULES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| (0..=MOST).map(rule).collect());
+/// Those that were asked for.
+static RULES: [OnceLock<Vec<[f64; 2]>>; MOST + 1] = [const { OnceLock::new() }; MOST + 1];
 
 /// The rule of `n` points, pairs of abscissa and weight; `n` is held to 1..=[`MOST`].
 pub fn gauss(n: usize) -> &'static [[f64; 2]] {
-    &RULES[n.clamp(1, MOST)]
+    let n = n.clamp(1, MOST);
+    RULES[n].get_or_init(|| rule(n))
 }
 
 /// The rule by Newton's method on the Legendre polynomial, from the asymptotic roots.

@@ -11,22 +11,38 @@ const MISS: f64 = 0.1;
 /// Cells from which on nothing more is divided, whatever the error: some hundred thousand places, a tenth of a second.
 const MOST: usize = 65_536;
 
+/// What is asked of an integral.
+#[derive(Clone, Copy)]
+pub struct Goal {
+    /// The integral of what is visible and what is hidden.
+    pub whole: f64,
+    /// The error that is allowed.
+    pub tolerance: f64,
+    /// Whether cells are divided until it is met; else the answer is none where the places at corners and centres of the
+    /// pieces do not meet it.
+    pub may_divide: bool,
+}
+
 /// Integrates over the pieces of a polygon past the panels listed until the error meets the tolerance, or the cells run out.
-/// `whole` is the integral of what is visible and what is hidden; the answer that of what is visible.
+/// The answer is the integral of what is visible.
 pub fn integrate(
     pieces: &[Piece],
-    (whole, tolerance): (f64, f64),
+    Goal { whole, tolerance, may_divide }: Goal,
     (shaded, sights): (&mut impl Shaded, &mut Sights),
     list: &[u16],
-) -> Exchange {
+) -> Option<Exchange> {
     let is_steep = shaded.is_steep();
+    if is_steep && !may_divide {
+        return None;
+    }
     let mut domain = Domain::new(pieces, shaded, sights);
+    domain.limit = if may_divide { f64::INFINITY } else { tolerance };
     let mut cells = domain.whole(list, false);
     if cells.iter().all(Cell::is_hidden) {
-        return Exchange::default();
+        return Some(Exchange::default());
     }
     let mut missed = (cells.iter().map(|c| c.values[0] + c.values[1]).sum::<f64>() - whole).abs();
-    if missed > MISS * tolerance || is_steep {
+    if may_divide && (missed > MISS * tolerance || is_steep) {
         missed = 0.0;
         cells = domain.whole(list, true);
     }
@@ -34,8 +50,11 @@ pub fn integrate(
         // A plain sum: along a kink parallel to an edge all cells err alike.
         let error = missed + cells.iter().map(Cell::error).sum::<f64>();
         let largest = cells.iter().filter(|c| c.is_open()).map(Cell::error).fold(0.0, f64::max);
-        if error <= tolerance || cells.len() > MOST || largest == 0.0 {
-            return Exchange { value: cells.iter().map(|c| c.values[0]).sum(), error };
+        if error <= tolerance || (may_divide && (cells.len() > MOST || largest == 0.0)) {
+            return Some(Exchange { value: cells.iter().map(|c| c.values[0]).sum(), error });
+        }
+        if !may_divide {
+            return None;
         }
         let mut next = Vec::with_capacity(4 * cells.len());
         for cell in cells {
@@ -113,7 +132,8 @@ mod tests {
                     let mut sights = Sights::default();
                     sights.clear(&shape.corners());
                     let pieces = [Piece { frame: *shape, side: 0 }];
-                    let found = integrate(&pieces, (2.0 * shape.area(), tolerance), (&mut plain, &mut sights), &[]);
+                    let goal = Goal { whole: 2.0 * shape.area(), tolerance, may_divide: true };
+                    let found = integrate(&pieces, goal, (&mut plain, &mut sights), &[]).unwrap();
                     assert!(found.error <= tolerance);
                     all += 1;
                     missed += usize::from((found.value - exact).abs() > found.error.max(1e-14));

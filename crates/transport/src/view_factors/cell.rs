@@ -193,7 +193,7 @@ fn share([visible, hidden]: [f64; 2]) -> f64 {
 /// share corners, and so do polygons side by side, of whatever sizes.
 #[derive(Default)]
 pub struct Sights {
-    seen: FxHashMap<(u16, [i64; 3]), Sight>,
+    seen: FxHashMap<(u16, [u64; 3]), Sight>,
     from: DVec3,
     /// Lines of the grid in a metre.
     grid: f64,
@@ -217,8 +217,10 @@ impl Sights {
         self.grid = LINES / extent;
     }
 
-    fn place(&self, place: DVec3) -> [i64; 3] {
-        ((place - self.from) * self.grid).to_array().map(|x| x.round() as i64)
+    /// The nearest point of the grid, as the bits of its coordinates: beyond 2⁵² numbers are whole.
+    fn place(&self, place: DVec3) -> [u64; 3] {
+        const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
+        ((place - self.from) * self.grid).to_array().map(|x| (x + WHOLE).to_bits())
     }
 }
 
@@ -229,11 +231,13 @@ pub struct Domain<'a, S> {
     sights: &'a mut Sights,
     /// Whether cells take the closed form of all that they see.
     is_known: bool,
+    /// Error above which cells are of no use, and nobody need ask what their places may have overlooked.
+    pub limit: f64,
 }
 
 impl<'a, S: Shaded> Domain<'a, S> {
     pub fn new(pieces: &'a [Piece], shaded: &'a mut S, sights: &'a mut Sights) -> Self {
-        Domain { pieces, shaded, sights, is_known: false }
+        Domain { pieces, shaded, sights, is_known: false, limit: f64::INFINITY }
     }
 
     /// The cells that together are all of it, past the panels listed; with `is_known` they take the closed form of all.
@@ -338,7 +342,9 @@ impl<'a, S: Shaded> Domain<'a, S> {
         let off = |p: &Place| p.factors[0] - share * p.all();
         let times = if cell.is_undivided() { UNDIVIDED } else { 1.0 };
         cell.error = times * (area * (off(&places.centre) - places.means(off).0).abs() / 3.0).max(cell.least);
-        cell.doubt += self.doubt(&cell, shape, places);
+        if cell.error <= self.limit {
+            cell.doubt += self.doubt(&cell, shape, places);
+        }
         cell
     }
 

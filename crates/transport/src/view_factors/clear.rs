@@ -5,10 +5,12 @@
 //! form, is decided pair by pair by what this leaves of the accuracy asked.
 
 use super::frame::{Frame, ORDERS, Weighted};
-use super::part::Part;
+use super::part::{Four, Part};
+use super::visible::Plane;
 use crate::pair::exact::exact;
 use glam::DVec3;
 use radiosity_scene::Facet;
+use smallvec::SmallVec;
 
 /// An exchange area A_i F_ij, m², and a bound of its error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,6 +19,13 @@ pub struct Exchange {
     pub value: f64,
     /// Bound of the error.
     pub error: f64,
+}
+
+impl Exchange {
+    /// What is visible is no more than the whole.
+    pub fn within(self, whole: Exchange) -> Exchange {
+        Exchange { value: self.value.clamp(0.0, whole.value), ..self }
+    }
 }
 
 /// The error of order n is at most this times (R/r)^2n A_i A_j/(π r²): twice the largest that was found among random
@@ -42,8 +51,8 @@ pub fn clear(a: &Part, b: &Part, tolerance: f64, cut: bool) -> (Exchange, Order)
     };
     match bounds.order(tolerance).filter(|_| !cut) {
         Some((order, error)) => {
-            let normals = [a.shape.normal(), b.shape.normal()];
-            (Exchange { value: cubature(a.rule(order), b.rule(order), normals).max(0.0), error }, order)
+            let (from, to) = (plane_of(&a.shape), plane_of(&b.shape));
+            (Exchange { value: cubature((a.rule(order), from), (b.fours(order), to)).max(0.0), error }, order)
         }
         None => (closed_form(&a.shape, &b.shape), 0),
     }
@@ -59,7 +68,8 @@ pub fn clear_frame(frame: &Frame, normal: DVec3, b: &Part, tolerance: f64) -> Ex
     };
     match bounds.order(tolerance) {
         Some((order, error)) => {
-            let value = cubature(&frame.rule(order), b.rule(order), [normal, b.shape.normal()]).max(0.0);
+            let from = (normal, normal.dot(centre));
+            let value = cubature((&frame.rule(order), from), (b.fours(order), plane_of(&b.shape))).max(0.0);
             Exchange { value, error }
         }
         None => Facet::new(frame.corners().to_vec()).map_or(Exchange::default(), |shape| closed_form(&shape, &b.shape)),
@@ -98,18 +108,31 @@ impl Bounds {
     }
 }
 
-/// The product of two rules.
-fn cubature(from: &[Weighted], to: &[Weighted], [n_a, n_b]: [DVec3; 2]) -> f64 {
+fn plane_of(shape: &Facet) -> Plane {
+    (shape.normal(), shape.normal().dot(shape.centroid()))
+}
+
+/// The product of two rules. The height of a point above the other's plane is the distance times the cosine there, and the
+/// same for all pairs that the point is in.
+fn cubature((from, (n_a, of_a)): (&[Weighted], Plane), (to, (n_b, of_b)): (&[Four], Plane)) -> f64 {
+    let heights: SmallVec<[[f64; 4]; 4]> = to
+        .iter()
+        .map(|Four { at: [x, y, z], weights }| {
+            std::array::from_fn(|k| weights[k] * (n_a.x * x[k] + n_a.y * y[k] + n_a.z * z[k] - of_a))
+        })
+        .collect();
     let mut sum = 0.0;
-    for &[x, y, z, w] in from {
-        let from = DVec3::new(x, y, z);
-        let mut inner = 0.0;
-        for &[x, y, z, w] in to {
-            let d = DVec3::new(x, y, z) - from;
-            let squared = d.length_squared();
-            inner += w * n_a.dot(d) * n_b.dot(d) / (squared * squared);
+    for &[px, py, pz, w] in from {
+        let mut inner = [0.0; 4];
+        for (Four { at: [x, y, z], .. }, heights) in to.iter().zip(&heights) {
+            for k in 0..4 {
+                let (dx, dy, dz) = (x[k] - px, y[k] - py, z[k] - pz);
+                let squared = dx * dx + dy * dy + dz * dz;
+                inner[k] += heights[k] / (squared * squared);
+            }
         }
-        sum -= w * inner;
+        let height = n_b.dot(DVec3::new(px, py, pz)) - of_b;
+        sum += w * height * ((inner[0] + inner[1]) + (inner[2] + inner[3]));
     }
     sum / std::f64::consts::PI
 }
@@ -149,10 +172,10 @@ mod tests {
             let squared = a.shape.centroid().distance_squared(b.shape.centroid());
             let mut bound = a.shape.area() * b.shape.area() / (std::f64::consts::PI * squared);
             let value = exact(&a.shape, &b.shape);
-            let normals = [a.shape.normal(), b.shape.normal()];
             for order in 1..=ORDERS {
                 bound *= radius * radius / squared;
-                let off = (cubature(a.rule(order), b.rule(order), normals) - value).abs() - CLOSED_FORM[0] * value;
+                let found = cubature((a.rule(order), plane_of(&a.shape)), (b.fours(order), plane_of(&b.shape)));
+                let off = (found - value).abs() - CLOSED_FORM[0] * value;
                 worst[order - 1] = worst[order - 1].max(off / bound);
             }
         }

@@ -6,7 +6,7 @@
 //! bends (`cell`, `adaptive`). Parts of the leaf that lies farther from the panels, by their size, are divided: what stands
 //! close to a part throws sharp shadows there, which only the exact side resolves.
 
-use super::adaptive::integrate;
+use super::adaptive::{Goal, integrate};
 use super::body::{Body, Occluder, Setting};
 use super::cell::{List, Shaded, Sights, bit};
 use super::clear::{Exchange, clear_frame, closed_form};
@@ -30,6 +30,10 @@ const STEEP: f64 = 1e-3;
 
 /// Error of visible and hidden together over all cells, relative to the tolerance.
 const OF_WHOLE: f64 = 0.01;
+
+/// Error of a facet that is not cut along kinks, relative to the tolerance. With 0 all are cut, and rows of a room of 3,200 patches,
+/// asked for 1e-4, are off by 4.4e-5 (RMS) instead of 6.1e-5; with 1 by 9.7e-5.
+const UNCUT: f64 = 0.4;
 
 /// What all parts of a leaf share that look at one target past the same panels. They lie in one plane, and from there
 /// bodies look alike, as do the lines where what is seen has kinks, and the corners where parts meet.
@@ -90,10 +94,19 @@ impl<'a> Stage<'a> {
         if area <= 0.0 {
             return None;
         }
-        let pieces = self.sides.cut(&from, outer.radius, &self.bodies, self.setting);
-        let mut view = View { shadows, stage: self, from: &from, of_whole: OF_WHOLE * tolerance / area };
-        let found = integrate(&pieces, (whole.value, tolerance), (&mut view, sights), list);
-        Some(Exchange { value: found.value.clamp(0.0, whole.value), ..found })
+        let of_whole = OF_WHOLE * tolerance / area;
+        // Most facets see smoothly enough as they are: places at corners, which neighbours share, and one in the middle tell.
+        if let Some(piece) = self.sides.uncut((&from, outer.radius), &self.bodies, self.setting) {
+            let mut view = View { shadows, stage: self, from: &from, of_whole };
+            let goal = Goal { whole: whole.value, tolerance: UNCUT * tolerance, may_divide: false };
+            if let Some(found) = integrate(&[piece], goal, (&mut view, sights), list) {
+                return Some(found.within(whole));
+            }
+        }
+        let pieces = self.sides.cut((&from, outer.radius), &self.bodies, self.setting);
+        let mut view = View { shadows, stage: self, from: &from, of_whole };
+        let goal = Goal { whole: whole.value, tolerance, may_divide: true };
+        integrate(&pieces, goal, (&mut view, sights), list).map(|found| found.within(whole))
     }
 }
 
@@ -132,7 +145,7 @@ impl Shaded for View<'_, '_> {
         let seen = sides.seen(side);
         let varying = bodies.iter().filter(|k| matches!(seen[**k as usize], Seen::Varying));
         let body = |k: &u16| Some((*k, Occluder::new(self.stage.bodies[*k as usize], *setting, place)?));
-        let varying: SmallVec<[(u16, Occluder); 1]> = varying.filter_map(body).collect();
+        let varying: Vec<(u16, Occluder)> = varying.filter_map(body).collect();
         let fixed = bodies.iter().filter_map(|k| match &seen[*k as usize] {
             Seen::As(occluder) => Some((*k, occluder)),
             _ => None,

@@ -18,12 +18,35 @@ pub struct Part {
     pub radius: f64,
     /// Points of each order.
     rules: [Vec<Weighted>; ORDERS],
+    /// The same in fours.
+    fours: [Vec<Four>; ORDERS],
+}
+
+/// Four points of a rule: their coordinates, and their shares of the area, m². What is missing weighs nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Four {
+    pub at: [[f64; 4]; 3],
+    pub weights: [f64; 4],
+}
+
+impl Four {
+    fn of(points: &[Weighted]) -> Four {
+        let point = |k: usize| points[k.min(points.len() - 1)];
+        Four {
+            at: std::array::from_fn(|axis| std::array::from_fn(|k| point(k)[axis])),
+            weights: std::array::from_fn(|k| if k < points.len() { points[k][3] } else { 0.0 }),
+        }
+    }
 }
 
 impl Part {
     /// The convex parts of facet `index`.
     pub fn of(index: u32, facet: &Facet) -> Vec<Part> {
-        let part = |shape: Facet| Part { facet: index, radius: shape.radius(), rules: rules(shape.corners()), shape };
+        let part = |shape: Facet| {
+            let rules = rules(shape.corners());
+            let fours = std::array::from_fn(|k| rules[k].chunks(4).map(Four::of).collect());
+            Part { facet: index, radius: shape.radius(), rules, fours, shape }
+        };
         if facet.is_convex() && facet.corners().len() <= CORNERS {
             return vec![part(facet.clone())];
         }
@@ -34,6 +57,12 @@ impl Part {
     #[inline]
     pub fn rule(&self, order: usize) -> &[Weighted] {
         &self.rules[order - 1]
+    }
+
+    /// The same points in fours.
+    #[inline]
+    pub fn fours(&self, order: usize) -> &[Four] {
+        &self.fours[order - 1]
     }
 }
 

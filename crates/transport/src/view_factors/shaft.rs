@@ -7,7 +7,7 @@
 
 use super::panel::Panel;
 use super::part::CORNERS;
-use super::visible::{Loop, keep_above};
+use super::visible::{Loop, Plane, keep_above};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -36,28 +36,45 @@ const MOST: usize = if CORNERS + 1 > 8 { CORNERS + 1 } else { 8 };
 
 /// Corners whose heights above a plane are asked for. Nearly all ends have four, and loops whose length is known take a third
 /// of the time.
-trait Corners {
+trait Corners: AsRef<[DVec3]> {
     type Heights: AsRef<[f64]>;
 
-    fn over(&self, plane: (DVec3, f64)) -> Self::Heights;
+    fn over(&self, plane: Plane) -> Self::Heights;
+
+    /// 1/|h| of heights; of none a number.
+    fn inverse(heights: &[f64]) -> Self::Heights;
 }
 
 impl Corners for [DVec3; 4] {
     type Heights = [f64; 4];
 
     #[inline(always)]
-    fn over(&self, (normal, offset): (DVec3, f64)) -> [f64; 4] {
+    fn over(&self, (normal, offset): Plane) -> [f64; 4] {
         let [a, b, c, d] = self;
         [normal.dot(*a) - offset, normal.dot(*b) - offset, normal.dot(*c) - offset, normal.dot(*d) - offset]
+    }
+
+    #[inline(always)]
+    fn inverse(heights: &[f64]) -> [f64; 4] {
+        std::array::from_fn(|k| inverse(heights[k]))
     }
 }
 
 impl Corners for [DVec3] {
     type Heights = SmallVec<[f64; MOST]>;
 
-    fn over(&self, (normal, offset): (DVec3, f64)) -> SmallVec<[f64; MOST]> {
+    fn over(&self, (normal, offset): Plane) -> SmallVec<[f64; MOST]> {
         self.iter().map(|corner| normal.dot(*corner) - offset).collect()
     }
+
+    fn inverse(heights: &[f64]) -> SmallVec<[f64; MOST]> {
+        heights.iter().map(|h| inverse(*h)).collect()
+    }
+}
+
+#[inline(always)]
+fn inverse(height: f64) -> f64 {
+    1.0 / height.abs().max(f64::MIN_POSITIVE)
 }
 
 #[inline(always)]
@@ -70,8 +87,8 @@ fn most(heights: &[f64]) -> f64 {
     heights.iter().fold(f64::NEG_INFINITY, |most, h| if *h > most { *h } else { most })
 }
 
-/// A plane: a normal n, n · x of its points, and n · x by which points count as lying on it.
-type Plane = (DVec3, f64, f64);
+/// A side of a hull: its normal n outwards, n · x of its points, and n · x by which points count as lying on it.
+type Side = (DVec3, f64, f64);
 
 /// What lies between two convex sets.
 #[derive(Clone, Debug)]
@@ -82,15 +99,17 @@ pub struct Shaft<'a> {
     normals: [DVec3; 2],
     /// Distance below which points count as lying on a plane.
     touch: f64,
-    /// Sides of the hull that join both, and those ends that are sides; normals outwards. Found when first asked for.
-    sides: Option<SmallVec<[Plane; 12]>>,
+    /// Sides of the hull that join both, and those ends that are sides: those that were asked for so far.
+    sides: SmallVec<[Side; 12]>,
+    /// Of how many ends.
+    ends_done: usize,
 }
 
 impl<'a> Shaft<'a> {
     /// The shaft between two sets; the normals of boxes are zero.
     pub fn new(ends: [&'a [DVec3]; 2], normals: [DVec3; 2], touch: f64) -> Shaft<'a> {
         debug_assert!(ends.iter().all(|end| end.len() <= MOST));
-        Shaft { ends, normals, touch, sides: None }
+        Shaft { ends, normals, touch, sides: SmallVec::new(), ends_done: 0 }
     }
 
     /// What `panel` does to the segments from one end to the other.
@@ -100,13 +119,8 @@ impl<'a> Shaft<'a> {
             (Ok(a), Ok(b)) => self.by_edges::<[DVec3; 4]>(panel, a, b),
             _ => self.by_edges(panel, a, b),
         };
-        let is_beside = |(outwards, offset, reach): &Plane| {
-            let least = offset - reach;
-            panel.corners.iter().all(|c| outwards.dot(*c) >= least)
-        };
         let is_open = found == Stands::Between && look == Look::Close && !self.is_hit(panel);
-        let is_aside = is_open && self.sides().iter().any(is_beside);
-        if is_aside { Stands::Aside } else { found }
+        if is_open && self.is_beside(panel) { Stands::Aside } else { found }
     }
 
     /// Whether a panel stands between the middles of both ends.
@@ -120,6 +134,24 @@ impl<'a> Shaft<'a> {
             && panel.rims.iter().all(|(inwards, offset)| inwards.dot(place) > offset + self.touch)
     }
 
+    /// Whether some side of the hull has the panel outside.
+    fn is_beside(&mut self, panel: &Panel) -> bool {
+        let mut asked = 0;
+        loop {
+            let is_outside = |(outwards, offset, reach): &Side| {
+                let least = offset - reach;
+                panel.corners.iter().all(|c| outwards.dot(*c) >= least)
+            };
+            if self.sides[asked..].iter().any(is_outside) {
+                return true;
+            }
+            asked = self.sides.len();
+            if !self.find_sides() {
+                return false;
+            }
+        }
+    }
+
     /// What `panel` does, by its edges.
     #[inline(always)]
     fn by_edges<C: Corners + ?Sized>(&self, panel: &Panel, a_end: &C, b_end: &C) -> Stands {
@@ -127,12 +159,17 @@ impl<'a> Shaft<'a> {
         let plane = (panel.normal, panel.offset);
         let (a, b) = (a_end.over(plane), b_end.over(plane));
         let (a, b) = (a.as_ref(), b.as_ref());
-        let side = |h: &[f64]| (least(h) >= -touch, most(h) <= touch);
-        let ((a_above, a_below), (b_above, b_below)) = (side(a), side(b));
-        if (a_above && b_above) || (a_below && b_below) {
+        let (a_side, b_side) = ([least(a), most(a)], [least(b), most(b)]);
+        let is_above = |[least, _]: [f64; 2]| least >= -touch;
+        let is_below = |[_, most]: [f64; 2]| most <= touch;
+        if (is_above(a_side) && is_above(b_side)) || (is_below(a_side) && is_below(b_side)) {
             return Stands::Aside;
         }
-        let is_parted = (a_above && b_below) || (a_below && b_above);
+        let is_parted = (is_above(a_side) && is_below(b_side)) || (is_below(a_side) && is_above(b_side));
+        let is_off = |[least, most]: [f64; 2]| least > touch || most < -touch;
+        let are_off = is_parted && is_off(a_side) && is_off(b_side);
+        let (by_a, by_b) = (C::inverse(a), C::inverse(b));
+        let (by_a, by_b) = (by_a.as_ref(), by_b.as_ref());
         let mut all_within = true;
         for &rim in &panel.rims {
             let (e, f) = (a_end.over(rim), b_end.over(rim));
@@ -142,23 +179,30 @@ impl<'a> Shaft<'a> {
                 return Stands::Aside;
             }
             let is_within = least(e) >= -touch && least(f) >= -touch;
-            let mut crossings = Crossings { touch, outside: true, within: true, is_within };
-            crossings.between([a, b], [e, f]);
-            if !is_parted {
-                crossings.between([a, a], [e, e]);
-                crossings.between([b, b], [f, f]);
+            let mut crossings = Crossings { touch, outside: true, within: true };
+            if are_off {
+                crossings.between(slopes(e, by_a, touch), slopes(f, by_b, touch));
+            } else {
+                let (of_a, of_b) = (slopes_by_side(a, e, by_a, touch), slopes_by_side(b, f, by_b, touch));
+                crossings.between(of_a[0], of_b[1]);
+                crossings.between(of_a[1], of_b[0]);
+                if !is_parted {
+                    crossings.between(of_a[0], of_a[1]);
+                    crossings.between(of_b[0], of_b[1]);
+                }
+                crossings.in_plane(a, e);
+                crossings.in_plane(b, f);
             }
-            crossings.in_plane(a, e);
-            crossings.in_plane(b, f);
             if crossings.outside {
                 return Stands::Aside;
             }
-            all_within &= crossings.within;
+            all_within &= is_within || crossings.within;
         }
         // What lies in the panel itself looks away from it: a polygon only touches it there, a box may hold whole
         // parts.
-        let is_off = |end: usize, h: &[f64]| self.normals[end] != DVec3::ZERO || h.iter().all(|h| h.abs() > touch);
-        if all_within && is_parted && is_off(0, a) && is_off(1, b) {
+        let only_touches =
+            |end: usize, h: &[f64]| self.normals[end] != DVec3::ZERO || h.iter().all(|h| h.abs() > touch);
+        if all_within && is_parted && only_touches(0, a) && only_touches(1, b) {
             return Stands::Across;
         }
         Stands::Between
@@ -167,7 +211,8 @@ impl<'a> Shaft<'a> {
     /// What of a panel lies in the shaft between two polygons; empty if nothing.
     pub fn part_of(&mut self, panel: &Panel) -> Loop {
         let mut part: Loop = panel.corners.iter().copied().collect();
-        for (outwards, offset, _) in self.sides() {
+        while self.find_sides() {}
+        for (outwards, offset, _) in &self.sides {
             if !keep_above(&mut part, -*outwards, -offset) {
                 return Loop::new();
             }
@@ -175,10 +220,85 @@ impl<'a> Shaft<'a> {
         part
     }
 
-    fn sides(&mut self) -> &[Plane] {
-        let Shaft { ends, normals, touch, .. } = *self;
-        self.sides.get_or_insert_with(|| sides(ends, normals, touch))
+    /// Finds more sides of the hull of two polygons, first those at edges of one and then of the other; whether there were more to
+    /// find.
+    fn find_sides(&mut self) -> bool {
+        let [a, b] = self.ends;
+        let (own, other, normal) = match self.ends_done {
+            0 => (a, b, self.normals[0]),
+            1 => (b, a, self.normals[1]),
+            _ => return false,
+        };
+        self.ends_done += 1;
+        match (own.try_into(), other.try_into()) {
+            (Ok(own), Ok(other)) => self.add_sides::<[DVec3; 4]>(own, other, normal),
+            _ => self.add_sides(own, other, normal),
+        }
+        true
     }
+
+    #[inline(always)]
+    fn add_sides<C: Corners + ?Sized>(&mut self, own: &C, other: &C, normal: DVec3) {
+        let touch = self.touch;
+        let offset = normal.dot(own.as_ref()[0]);
+        let heights = other.over((normal, offset));
+        let heights = heights.as_ref();
+        let (own, other) = (own.as_ref(), other.as_ref());
+        let (low, high) = (least(heights), most(heights));
+        if low >= -touch {
+            self.sides.push((-normal, -offset, touch));
+        }
+        if high <= touch {
+            self.sides.push((normal, offset, touch));
+        }
+        // Seen along an edge, the polygon and what lies above it span a wedge; so do the polygon and what lies below.
+        for (turn, is_there) in [(1.0, high > touch), (-1.0, low < -touch)] {
+            if !is_there {
+                continue;
+            }
+            for (i, &p) in own.iter().enumerate() {
+                let along = turn * (own[(i + 1) % own.len()] - p);
+                let (mut side, mut of) = (DVec3::ZERO, 0.0);
+                for (&q, height) in other.iter().zip(heights) {
+                    if side == DVec3::ZERO || side.dot(q - p) > 0.0 {
+                        (side, of) = (along.cross(q - p), turn * height);
+                    }
+                }
+                // What lies on the polygon's own side of the edge stays behind a plane that rises from it.
+                let reach = touch * side.length();
+                if of >= 0.0 && reach > 0.0 && other.iter().all(|x| side.dot(*x - p) <= reach) {
+                    self.sides.push((side, side.dot(p), reach));
+                }
+            }
+        }
+    }
+}
+
+/// Of corners on one side of a panel's plane, at heights h and distances e within an edge: the most of (e − touch)/|h| and
+/// the least of (e + touch)/|h|. The segment from (h, e) to (−k, f) on the other side crosses the plane at
+/// (e k + f h)/(h + k) = (e/h + f/k) h k/(h + k) within the edge. So all segments between two sets cross outside if the most
+/// of one and of the other sum to less than zero, and within if the least to more: corners suffice, not pairs of them.
+type Slopes = [f64; 2];
+
+/// Of corners that all lie on one side; `by` is 1/|h|.
+#[inline(always)]
+fn slopes(inside: &[f64], by: &[f64], touch: f64) -> Slopes {
+    inside.iter().zip(by).fold([f64::NEG_INFINITY, f64::INFINITY], |[high, low], (e, by)| {
+        let (outer, inner) = ((e - touch) * by, (e + touch) * by);
+        [if outer > high { outer } else { high }, if inner < low { inner } else { low }]
+    })
+}
+
+/// Of those that lie above, and of the others.
+#[inline(always)]
+fn slopes_by_side(heights: &[f64], inside: &[f64], by: &[f64], touch: f64) -> [Slopes; 2] {
+    let mut found = [slopes(&[], &[], touch); 2];
+    for ((h, e), by) in heights.iter().zip(inside).zip(by) {
+        let (outer, inner) = ((e - touch) * by, (e + touch) * by);
+        let [high, low] = &mut found[usize::from(*h <= 0.0)];
+        (*high, *low) = (if outer > *high { outer } else { *high }, if inner < *low { inner } else { *low });
+    }
+    found
 }
 
 /// Where the segments between corners cross the plane of a panel: all outside of an edge, or all within it.
@@ -186,27 +306,15 @@ struct Crossings {
     touch: f64,
     outside: bool,
     within: bool,
-    /// Whether they are known to be within.
-    is_within: bool,
 }
 
 impl Crossings {
-    /// Segments between two sets of corners, by their heights above the plane and their distances within the edge.
+    /// Segments between corners on either side.
     #[inline(always)]
-    fn between(&mut self, heights: [&[f64]; 2], inside: [&[f64]; 2]) {
-        for (a, e) in heights[0].iter().zip(inside[0]) {
-            for (b, f) in heights[1].iter().zip(inside[1]) {
-                if (*a > 0.0) != (*b > 0.0) {
-                    let (length, within) = if *a > 0.0 { (a - b, a * f - b * e) } else { (b - a, b * e - a * f) };
-                    self.outside &= within <= self.touch * length;
-                    self.within &= within >= -self.touch * length;
-                }
-            }
-            if !self.outside && (self.is_within || !self.within) {
-                self.within |= self.is_within;
-                return;
-            }
-        }
+    fn between(&mut self, [high, low]: Slopes, [other_high, other_low]: Slopes) {
+        // None on a side is infinite, and nothing crosses.
+        self.outside &= high + other_high <= 0.0;
+        self.within &= low + other_low >= 0.0;
     }
 
     /// Corners in the plane are met there, and a crossing next to one may get lost in rounding.
@@ -219,45 +327,10 @@ impl Crossings {
     }
 }
 
-/// The sides of the hull of two polygons that join both, and those of the polygons that are sides of it.
-fn sides(ends: [&[DVec3]; 2], normals: [DVec3; 2], touch: f64) -> SmallVec<[Plane; 12]> {
-    let mut sides = SmallVec::new();
-    for (own, other, normal) in [(ends[0], ends[1], normals[0]), (ends[1], ends[0], normals[1])] {
-        let heights: SmallVec<[f64; MOST]> = other.iter().map(|q| normal.dot(*q - own[0])).collect();
-        let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-        if low >= -touch {
-            sides.push((-normal, -normal.dot(own[0]), touch));
-        }
-        if high <= touch {
-            sides.push((normal, normal.dot(own[0]), touch));
-        }
-        // Seen along an edge, the polygon and what lies above it span a wedge; so do the polygon and what lies below.
-        for (turn, is_there) in [(1.0, high > touch), (-1.0, low < -touch)] {
-            if !is_there {
-                continue;
-            }
-            for (i, &p) in own.iter().enumerate() {
-                let along = turn * (own[(i + 1) % own.len()] - p);
-                let (mut side, mut of) = (DVec3::ZERO, 0.0);
-                for (&q, height) in other.iter().zip(&heights) {
-                    if side == DVec3::ZERO || side.dot(q - p) > 0.0 {
-                        (side, of) = (along.cross(q - p), turn * height);
-                    }
-                }
-                // What lies on the polygon's own side of the edge stays behind a plane that rises from it.
-                let reach = touch * side.length();
-                if of >= 0.0 && reach > 0.0 && other.iter().all(|x| side.dot(*x - p) <= reach) {
-                    sides.push((side, side.dot(p), reach));
-                }
-            }
-        }
-    }
-    sides
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use radiosity_trace::sampling::Random;
 
     fn square(z: f64, low: [f64; 2], high: [f64; 2]) -> Vec<DVec3> {
         let p = |x: f64, y: f64| DVec3::new(x, y, z);
@@ -271,6 +344,34 @@ mod tests {
 
     fn stands(panel: &Panel, a: &[DVec3], b: &[DVec3], look: Look) -> Stands {
         Shaft::new([a, b], [DVec3::Z, DVec3::Z], 1e-7).stands(panel, look)
+    }
+
+    /// Corners tell of crossings what all pairs of them do.
+    #[test]
+    fn slopes_are_as_good_as_pairs() {
+        let mut random = Random::new(3);
+        let touch = 1e-3;
+        let mut found = [0; 3];
+        for _ in 0..4000 {
+            let shift = 3.0 * random.next_unit() - 1.5;
+            let mut of = |low: f64| -> [f64; 4] { std::array::from_fn(|_| low + 2.0 * random.next_unit()) };
+            let (heights, inside) = (of(-1.0), of(shift - 1.0));
+            let mut plain = Crossings { touch, outside: true, within: true };
+            for (a, e) in heights.iter().zip(inside).filter(|(a, _)| **a > 0.0) {
+                for (b, f) in heights.iter().zip(inside).filter(|(b, _)| **b <= 0.0) {
+                    let at = (a * f - b * e) / (a - b);
+                    plain.outside &= at <= touch;
+                    plain.within &= at >= -touch;
+                }
+            }
+            let mut fast = Crossings { touch, outside: true, within: true };
+            let by = <[DVec3; 4]>::inverse(&heights);
+            let [above, below] = slopes_by_side(&heights, &inside, &by, touch);
+            fast.between(above, below);
+            assert_eq!((plain.outside, plain.within), (fast.outside, fast.within), "{heights:?} {inside:?}");
+            found[usize::from(plain.outside) + 2 * usize::from(plain.within && !plain.outside)] += 1;
+        }
+        assert!(found.iter().all(|n| *n > 400), "{found:?}");
     }
 
     #[test]

@@ -9,7 +9,7 @@
 use super::body::{Body, Line, Occluder, Setting};
 use super::cell::Piece;
 use super::frame::Frame;
-use super::visible::{Loop, cut_off};
+use super::visible::{Loop, Plane, cut_off};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -24,9 +24,6 @@ const FEW: usize = 6;
 
 /// Pieces beyond which no more are cut.
 const MANY: usize = 64;
-
-/// A plane: a normal n, and n · x of its points.
-type Plane = (DVec3, f64);
 
 /// Cuts pieces of a convex polygon by a plane.
 fn cut(pieces: &mut Vec<Loop>, plane: Plane, size: f64) {
@@ -167,9 +164,19 @@ impl Sides {
         &self.sides[side as usize].seen
     }
 
+    /// A convex polygon of a size (m) in the region as it is, if it is a parallelogram and no plane of a face crosses it.
+    pub fn uncut(&mut self, (from, size): (&[DVec3], f64), bodies: &[Body], setting: Setting) -> Option<Piece> {
+        let frames = Frame::of(from);
+        let [frame] = frames[..] else { return None };
+        if !frame.is_square || self.faces.iter().any(|(_, face)| is_crossed(from, *face, size)) {
+            return None;
+        }
+        Some(Piece { frame, side: self.side(from, size, bodies, setting) as u16 })
+    }
+
     /// Cuts a convex polygon of a size (m) in the region by the planes of faces that cross it, and then where edges of
     /// bodies meet parallel ones.
-    pub fn cut(&mut self, from: &[DVec3], size: f64, bodies: &[Body], setting: Setting) -> SmallVec<[Piece; 4]> {
+    pub fn cut(&mut self, (from, size): (&[DVec3], f64), bodies: &[Body], setting: Setting) -> SmallVec<[Piece; 4]> {
         let [mut pieces, mut parts] = std::mem::take(&mut self.scratch);
         pieces.push(from.into());
         for (_, face) in &self.faces {
@@ -258,7 +265,7 @@ mod tests {
         let setting = Setting { panels: &[&plate], obstacles, target: &target, touch: 1e-9 };
         let (region, bodies) = (square(0.0, -1.0, 2.0), [Body::Panel(0)]);
         let mut sides = Sides::new(&region, &bodies, setting);
-        let pieces = sides.cut(&square(0.0, 0.0, 1.0), 1.0, &bodies, setting);
+        let pieces = sides.cut((&square(0.0, 0.0, 1.0), 1.0), &bodies, setting);
         // 2 · 0.4 − 0 = 0.8 and 2 · 0.7 − 1 = 0.4 lie on it; 2 · 0.4 − 1 and 2 · 0.7 do not.
         assert_eq!((pieces.len(), sides.sides.len()), (9, 1));
         let area: f64 = pieces.iter().map(|piece| piece.frame.area()).sum();
@@ -290,10 +297,10 @@ mod tests {
         assert_eq!((seen([0.5, 0.5, 2.0]).edges.len(), seen([0.5, 0.5, 2.0]).faces.len()), (4, 1));
         let (from, bodies) = (square(2.0, 0.25, 1.75), [Body::Solid(0)]);
         let mut sides = Sides::new(&from, &bodies, setting);
-        sides.cut(&from, 1.0, &bodies, setting);
+        sides.cut((&from, 1.0), &bodies, setting);
         assert_eq!(sides.sides.len(), 4);
         // Half of it lies on the same sides.
-        sides.cut(&square(2.0, 0.25, 1.25), 1.0, &bodies, setting);
+        sides.cut((&square(2.0, 0.25, 1.25), 1.0), &bodies, setting);
         assert_eq!(sides.sides.len(), 4);
     }
 }

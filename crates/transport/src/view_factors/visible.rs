@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-12;
 const FEW: usize = 8;
 
 /// A plane: a normal n, and n · x of its points.
-type Plane = (DVec3, f64);
+pub type Plane = (DVec3, f64);
 
 /// An odd number whose multiples mix bits.
 const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -193,14 +193,22 @@ enum Within {
     All,
 }
 
-/// How much of a polygon lies within a shadow; a part is left in `clip`.
+/// How much of a polygon lies within a shadow; a part is left in `clip`. Nearly all have four corners, and loops whose length
+/// is known take half the time.
 fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
+    match <&[DVec3; 4]>::try_from(polygon) {
+        Ok(four) => within_shadow(four, shadow, clip, &mut [0.0; 4]),
+        Err(_) => within_shadow(polygon, shadow, clip, &mut SmallVec::<[f64; 16]>::from_elem(0.0, polygon.len())),
+    }
+}
+
+#[inline(always)]
+fn within_shadow(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip, heights: &mut [f64]) -> Within {
     // Planes that cut and corners that lie outside, as bits.
     let (mut cuts, mut outside, mut first) = (0u64, 0u64, None);
-    clip.heights.resize(polygon.len(), 0.0);
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
-        for (height, p) in clip.heights.iter_mut().zip(polygon) {
+        for (height, p) in heights.iter_mut().zip(polygon) {
             let h = normal.dot(*p) - offset;
             low = if h < low { h } else { low };
             high = if h > high { h } else { high };
@@ -214,10 +222,10 @@ fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
             if first.is_none() {
                 first = Some(k);
                 clip.part.clear();
-                keep(polygon, clip.heights.iter().copied(), reach, |p| clip.part.push(p));
+                keep(polygon, heights.iter().copied(), reach, |p| clip.part.push(p));
             }
             cuts |= 1 << k.min(63);
-            for (i, h) in clip.heights.iter().enumerate() {
+            for (i, h) in heights.iter().enumerate() {
                 outside |= u64::from(*h < -reach) << (i % 32);
             }
         }

@@ -2,7 +2,7 @@
 //! part, and one by one only where something may stand between these.
 
 use super::body::Setting;
-use super::cell::{List as Places, Sights};
+use super::cell::{List as Chosen, Sights};
 use super::clear::{Exchange, clear};
 use super::cluster::{Cluster, Clusters};
 use super::mixed::{Stage, above, distance};
@@ -219,7 +219,7 @@ impl<'a> Walk<'a> {
             self.choices.facing_away += 1;
             return;
         }
-        let mut list = Places::new();
+        let mut list = Chosen::new();
         if !target.panels.is_empty() {
             let mut shaft = Shaft::new(ends.map(|end| end.corners), [a, b].map(|part| part.shape.normal()), self.touch);
             for (k, panel) in target.panels.iter().enumerate() {
