@@ -56,13 +56,14 @@ export const VERTEX = /* glsl */ `
   in vec3 paint;
   in vec3 outward;
   uniform highp sampler2D looks;
-  out vec3 vLight;
-  out vec3 reflected;
-  out vec2 vUv;
+  // Read where the surface is within the pixel: in the middle of a pixel that it only touches they would be far from what it has.
+  centroid out vec3 vLight;
+  centroid out vec3 reflected;
+  centroid out vec2 vUv;
   flat out vec3 emission;
   #ifdef SHEET
     in vec3 through;
-    out vec3 vThrough;
+    centroid out vec3 vThrough;
   #endif
   void main() {
     #include <batching_vertex>
@@ -81,14 +82,14 @@ export const VERTEX = /* glsl */ `
 
 export const FRAGMENT = /* glsl */ `
   precision highp float;
-  in vec3 vLight;
-  in vec2 vUv;
+  centroid in vec3 vLight;
+  centroid in vec2 vUv;
   uniform int mode;
   uniform float exposure;
-  in vec3 reflected;
+  centroid in vec3 reflected;
   flat in vec3 emission;
   #ifdef SHEET
-    in vec3 vThrough;
+    centroid in vec3 vThrough;
   #endif
   uniform float emissionShown;
   uniform sampler2D map;

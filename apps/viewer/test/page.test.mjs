@@ -333,6 +333,40 @@ test('through the walls of a closed room nothing is seen, whichever way one look
   });
 });
 
+test('no pixel at an edge is brighter than any light there, as dots were', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const found = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const { stage } = app;
+    app.exposure.set(-7);
+    app.showLayer({ bounce: 1 });
+    stage.overlay.visible = stage.tools.visible = false;
+    const gl = stage.renderer.getContext();
+    const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+    /** The brightest pixel if vertices have this light, half floats of 16 lx. */
+    const brightest = (light) => {
+      for (const surface of stage.surfaces.values()) stage.shine(surface, 0, Uint16Array.from({ length: surface.light.array.length }, (_, i) => light(Math.floor(i / 3))));
+      stage.drawNow();
+      gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return pixels.reduce((most, value, i) => (i % 4 === 3 ? most : Math.max(most, value)), 0);
+    };
+    const bright = 0x4c00;
+    const middle = stage.bounds.getCenter(stage.camera.position.clone());
+    const size = stage.bounds.max.distanceTo(stage.bounds.min);
+    // From so far away triangles are a few pixels wide, and many have only a corner or a rim in one.
+    return [6, 9, 12].map((far) => {
+      stage.camera.position.copy(middle).add({ x: far * 0.2 * size, y: far * 0.3 * size, z: far * size });
+      stage.camera.lookAt(middle);
+      return [brightest(() => bright), brightest((vertex) => (vertex % 2 === 0 ? bright : 0))];
+    });
+  });
+  console.log(`brightest pixel where all vertices have light, and where some have: ${found.join('; ')}`);
+  for (const [all, some] of found) assert.ok(all > 50 && all < 220 && some <= all + 1, `${found}`);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('a narrow screen that is touched', async () => {
   const page = await pages.open(program.url, { width: 390, height: 844, touch: true });
   await done(page);
