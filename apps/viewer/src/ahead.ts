@@ -11,6 +11,8 @@ export class Ahead<T extends { id: number }> {
   /** As the server said last. */
   private said = new Map<number, T>();
   private own = new Map<number, { change: Partial<T>; since: number }>();
+  /** The largest number shown. */
+  private last = -1;
 
   /** Things as they are shown, and what shows one. */
   constructor(private shown: Map<number, T>, private show: (thing: T) => void) {}
@@ -54,7 +56,12 @@ export class Ahead<T extends { id: number }> {
     const said = this.said.get(id);
     if (!said) return;
     const thing = { ...said, ...this.own.get(id)?.change };
+    // What was changed last comes last to a page that is opened then; lists are by number all the same.
+    const later = this.shown.has(id) || id > this.last ? [] : [...this.shown].filter(([other]) => other > id);
+    for (const [other] of later) this.shown.delete(other);
     this.shown.set(id, thing);
+    for (const [other, same] of later) this.shown.set(other, same);
+    this.last = Math.max(this.last, id);
     this.show(thing);
   }
 }

@@ -284,6 +284,37 @@ test('what is dimmed looks darker, its error is told, and lamps that were turned
   assert.deepEqual(await levels(), chosen);
 }));
 
+test('lamps and things keep their order where one was changed and the page, or the saved scene, is opened again', () => inStudio(async (page) => {
+  const lists = async (page) => {
+    // Panels are told with the next picture.
+    await page.locator('.light b').nth(1).waitFor();
+    const [lights, things] = ['.light b', '#things option'].map((what) => page.locator(what).allTextContents());
+    return [await lights, await things, (await state(page)).lights.map(({ id }) => id), (await state(page)).objects.map(({ id }) => id)];
+  };
+  const before = await lists(page);
+  assert.deepEqual(before[0], ['bulb', 'spot']);
+  const { edits } = (await state(page)).status;
+  await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.setLight(app.lights.get(0), { dimming: 0.3 });
+    app.edit({ reflectance: { object: 0, reflectance: [0.2, 0.5, 0.2] } });
+  });
+  await done(page, edits + 2);
+  const glb = await saved(page);
+  await page.reload();
+  await done(page);
+  assert.deepEqual(await lists(page), before);
+  await folder(async (path) => {
+    writeFileSync(join(path, 'saved.glb'), glb);
+    const again = await view(join(path, 'saved.glb'), ...SMALL);
+    const other = await pages.open(again.url);
+    await done(other);
+    assert.deepEqual(await lists(other), before);
+    await other.context().close();
+    await again.end();
+  });
+}));
+
 test('lamps without area, sheets and colours at vertices', () => inStudio(async (page) => {
   await page.evaluate(() => window.radiosity.app.exposure.set(-5));
 

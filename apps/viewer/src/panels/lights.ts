@@ -9,7 +9,7 @@ const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', direct
 
 export function lightsPanel(app: App): HTMLElement {
   const list = el('div', { class: 'list' });
-  const rows = new Map<number, (light: LightNotice) => void>();
+  const rows = new Map<number, { element: HTMLElement; set(light: LightNotice): void }>();
   const none = el('p', { class: 'quiet' }, 'This scene has no light.');
   const all = el('div', { class: 'row' },
     button('All on', () => app.turnOn(), { title: 'Turn all lights on; after “All off” as they were' }),
@@ -21,11 +21,11 @@ export function lightsPanel(app: App): HTMLElement {
   app.on('lights', () => {
     for (const light of app.lights.values()) {
       if (!rows.has(light.id)) {
-        const { element, set } = row(app, light.id);
-        rows.set(light.id, set);
-        list.append(element);
+        const next = Math.min(...[...rows.keys()].filter((id) => id > light.id));
+        rows.set(light.id, row(app, light.id));
+        list.insertBefore(rows.get(light.id)!.element, rows.get(next)?.element ?? null);
       }
-      rows.get(light.id)!(light);
+      rows.get(light.id)!.set(light);
     }
     const there = [...app.lights.values()].filter(({ deleted }) => !deleted).length;
     none.hidden = there > 0;
