@@ -44,6 +44,7 @@ function bar({ name, share }: Share): HTMLElement {
 }
 
 export function gridPanel(app: App): HTMLElement {
+  const element = section('grid', 'Measuring grid', false);
   const facts = el('div', { class: 'facts' });
   const warning = el('p', { class: 'warning' });
   const metres = (sides: number[]) => `${sides.map((side) => side.toFixed(2)).join(' × ')} m`;
@@ -58,6 +59,8 @@ export function gridPanel(app: App): HTMLElement {
   };
   const field = (label: string, input: HTMLElement) =>
     el('label', { class: 'row' }, el('span', { class: 'quiet' }, label), el('span', { class: 'grow' }), input, el('span', { class: 'unit' }, 'm'));
+  /** What was laid last, once its numbers have been shown. */
+  let shown: object | null = null;
   app.on('grid', () => {
     const { grid, plane } = app;
     for (const [input, value] of [[height, app.planeHeight], [border, app.planeBorder]] as const) {
@@ -83,12 +86,18 @@ export function gridPanel(app: App): HTMLElement {
       fact('Cells', metres(cell) + (isCoarse ? ', coarser than the standard' : '')),
       fact(answer ? 'Plane' : 'Surface', metres(size)),
     );
+    const laid = grid ?? plane;
+    if (laid === shown) return;
+    shown = laid;
+    element.open = true;
+    element.scrollIntoView({ block: 'nearest' });
   });
   for (const topic of ['view', 'status'] as const) app.on(topic, () => { if (app.grid || app.plane) app.tell('grid'); });
-  return section('grid', 'Measuring grid', false,
+  element.lastElementChild!.append(
     el('p', { class: 'quiet' }, 'Cells are no larger than EN 12464-1 asks. A grid stays until another is laid.'),
     el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G', title: 'Over the whole plane that was picked, in the layer that is shown' })),
     el('div', { class: 'row' }, button('Working plane above it', () => app.measurePlane(), { key: 'Shift+G', title: 'In the air above the picked floor, as far as the room goes; points within things are left out' })),
     field('Height above it', height), field('Left out along walls', border),
     warning, facts, el('div', { class: 'row' }, csv, clear));
+  return element;
 }
