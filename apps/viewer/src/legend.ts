@@ -87,16 +87,23 @@ export function gridNumbers(app: App): { element: HTMLElement; update(): void } 
     if (now === last) return;
     last = now;
     const taken: [number, number][] = [];
+    const page = app.stage.canvas.getBoundingClientRect();
+    const scale = document.querySelector('#legend')!.getBoundingClientRect();
+    // A number is this wide and tall at most, and stands above its point.
+    const isBehindScale = ({ x, y }: { x: number; y: number }) =>
+      scale.width > 0 && x + 20 > scale.left - page.left && x - 20 < scale.right - page.left && y > scale.top - page.top && y - 20 < scale.bottom - page.top;
     for (const { span, point } of spans) {
       const at = app.stage.project(point);
-      // Numbers that would lie on each other are left out.
-      const isFree = at !== null && taken.every(([x, y]) => Math.abs(x - at.x) > 34 || Math.abs(y - at.y) > 15);
+      // Numbers that would lie on each other, or behind the scale, are left out.
+      const isFree = at !== null && !isBehindScale(at) && taken.every(([x, y]) => Math.abs(x - at.x) > 34 || Math.abs(y - at.y) > 15);
       span.hidden = !isFree;
       if (!at || !isFree) continue;
       taken.push([at.x, at.y]);
       span.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -130%)`;
     }
   };
+  // The scale comes and goes, and is as wide as its numbers.
+  app.on('view', () => { last = ''; });
   app.on('grid', () => {
     last = '';
     const points = measured(app);
