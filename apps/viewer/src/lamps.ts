@@ -23,6 +23,12 @@ const AHEAD = 2;
 /** Metres below the ceiling: light that falls on it at an angle would need a finer mesh than is there. */
 const BELOW = 0.1;
 
+/** Metres from surfaces, where there is room: nearer, all of its light would be one spot on a wall. */
+const CLEAR = 0.3;
+
+/** Share of the picture's height, from its middle, up to which a lamp is well seen. */
+const SEEN = 0.85;
+
 /** Solid angle that a lamp fills as if it were as bright everywhere as in its middle. A spot fades by the square of what is
  *  left of the cosine between both angles, as glTF has it. */
 export function solidAngle(cone: number[] | null): number {
@@ -54,7 +60,7 @@ export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: str
   const white = (intensity: number) => [intensity, intensity, intensity];
   const level = (x: number, y: number, z: number) => new Vector3(x, y, z).applyQuaternion(stage.camera.quaternion).setY(0).normalize();
   const at = (place: Vector3) => stage.toScene(place).toArray();
-  const place = ahead(stage, metre);
+  const place = cleared(stage, metre, ahead(stage, metre));
   if (kind === 'directional') {
     // Over the left shoulder, 45° high: what one sees is lit, and its shadows are seen.
     const direction = level(0.5, 0, -1).add(new Vector3(0, -1, 0));
@@ -63,7 +69,14 @@ export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: str
   }
   if (kind === 'point') return { name, kind, position: at(place), intensity: white(FLUX / solidAngle(null)) };
   const ceiling = stage.cast(place, new Vector3(0, 1, 0), Infinity, DoubleSide);
-  place.y += ceiling ? Math.max(0.5 * ceiling.distance, ceiling.distance - BELOW * metre) : metre;
+  // Below the ceiling, or as high as the picture shows.
+  let rise = ceiling ? Math.max(0.5 * ceiling.distance, ceiling.distance - BELOW * metre) : metre;
+  const isSeen = () => {
+    const at = stage.project(place.clone().setY(place.y + rise));
+    return at !== null && at.y > (0.5 - 0.5 * SEEN) * stage.canvas.clientHeight;
+  };
+  for (let tries = 0; tries < 16 && !isSeen(); tries += 1) rise *= 0.8;
+  place.y += rise;
   return { name, kind: { spot: { inner: INNER, outer: OUTER } }, position: at(place), intensity: white(FLUX / solidAngle([INNER, OUTER])) };
 }
 
@@ -77,6 +90,18 @@ function ahead(stage: Stage, metre: number): Vector3 {
   if (!entry) return bounds.getCenter(new Vector3());
   const before = entry.distanceTo(camera.position);
   return ray.at(before + Math.min(AHEAD * metre, hit ? 0.5 * Math.max(0, hit.distance - before) : Infinity), new Vector3());
+}
+
+/** The place, or one beside it that is farther from what is near, as far as there is room on the other side; in front of who looks. */
+function cleared(stage: Stage, metre: number, place: Vector3): Vector3 {
+  const clear = Math.min(CLEAR * metre, 0.5 * place.distanceTo(stage.camera.position));
+  for (const axis of [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)]) {
+    const [up, down] = [axis, axis.clone().negate()].map((way) => stage.cast(place, way, 2 * clear, DoubleSide)?.distance ?? 2 * clear);
+    const [near, far] = [Math.min(up, down), Math.max(up, down)];
+    const way = Math.min(Math.max(0, clear - near), 0.5 * (far - near));
+    place.addScaledVector(axis, up < down ? -way : way);
+  }
+  return place;
 }
 
 /** Half a metre to the side of a lamp, on the right of who looks, or where there is more room: no wall is between them. */

@@ -467,6 +467,47 @@ test('a lamp is added, duplicated, deleted and brought back by keyboard and by m
   await page.context().close();
 });
 
+test('a lamp that is added is clear of walls and in the picture, wherever one stands', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  for (const kind of ['point', 'spot']) {
+    // Before a wall, and along one.
+    for (const [eye, target] of [[[0.28, 0.27, 0.08], [0.28, 0.27, 0]], [[0.02, 0.3, 0.5], [0.02, 0.3, 0]], [[0.28, 0.3, 1.2], [0.28, 0.2, 0]]]) {
+      const count = (await state(page)).lights.length;
+      const { edits } = (await state(page)).status;
+      await page.evaluate(([kind, eye, target]) => {
+        const { app } = window.radiosity;
+        app.stage.camera.position.set(...eye);
+        app.stage.camera.lookAt(...target);
+        app.stage.camera.updateMatrixWorld();
+        app.addLamp(kind);
+      }, [kind, eye, target]);
+      await page.waitForFunction((count) => window.radiosity.state().lights.length > count && window.radiosity.state().selectedLight !== null, count);
+      await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, edits);
+      const found = await page.evaluate(() => {
+        const { app } = window.radiosity;
+        const place = app.spot();
+        const { camera, canvas } = app.stage;
+        const at = app.stage.project(place);
+        const way = place.clone().sub(camera.position);
+        const far = way.length();
+        return {
+          at: at && [at.x / canvas.clientWidth, at.y / canvas.clientHeight], isHidden: app.stage.cast(camera.position.clone(), way.normalize(), 0.999 * far) !== null,
+          position: place.toArray(), far, name: app.lights.get(app.selectedLight).name,
+        };
+      });
+      assert.match(found.name, /^Lamp/);
+      assert.ok(found.at && found.at.every((share) => share > 0.02 && share < 0.98) && !found.isHidden, JSON.stringify(found));
+      // The box is 0.55 m wide; a lamp is a hand from its sides, for those who fit into it, or half as far as from who looks.
+      const nearest = Math.min(found.position[0], 0.55 - found.position[0]);
+      assert.ok(nearest > 0.02, JSON.stringify(found));
+    }
+  }
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('a lamp of the file becomes another kind, brighter and narrower by keyboard, and light follows as a batch solve has it', () => inStudio(async (page) => {
   const before = await luxOf(page, 150);
   const { lights, status: { edits } } = await state(page);
