@@ -10,6 +10,7 @@ import { gridPanel, meterPanel } from './panels/meter';
 import { el } from './panels/parts';
 import { thingPanel } from './panels/thing';
 import { viewPanel } from './panels/view';
+import { reading } from './reading';
 import { stick } from './stick';
 import { tests } from './tests';
 
@@ -33,9 +34,10 @@ function start(): void {
   const told = el('span', { id: 'told', class: 'unseen', role: 'status' });
   const message = el('span', { id: 'message', role: 'alert' });
   const numbers = gridNumbers(app);
+  const read = reading(app);
   const cross = el('div', { class: 'cross', 'aria-hidden': 'true' });
   const veil = el('div', { class: 'veil' }, el('p', {}, 'Opening …'));
-  const view = el('main', {}, app.stage.canvas, cross, numbers.element, legend(app), stick(app), veil);
+  const view = el('main', {}, app.stage.canvas, cross, numbers.element, read.element, legend(app), stick(app), veil);
   document.body.append(bar(app, { help: () => help.showModal(), fold }), view, panel, el('footer', {}, doing, told, el('span', { class: 'grow' }), message), help);
   if (innerWidth < NARROW) fold();
   listen(app, { help, fold });
@@ -85,6 +87,7 @@ function start(): void {
     app.exposure.update(now, passed);
     app.stage.draw(now);
     numbers.update();
+    read.update();
     requestAnimationFrame(tick);
   };
   requestAnimationFrame(tick);
