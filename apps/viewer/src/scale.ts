@@ -36,13 +36,17 @@ export function ticks(low: number, high: number, most: number): number[] {
   return best;
 }
 
-/** The round numbers about the middle 96 % of what is seen, at most three and a half decades. */
+/** How much more and less than the median of what is seen the scale holds: a garden behind a window is a hundred times as bright as the
+ *  room, and would leave it one colour. Less, and patches of lamps on walls would be cut off. */
+const [ABOVE, BELOW] = [10, 30];
+
+/** The round numbers about the middle 96 % of what is seen, not too far from the median. */
 export function rangeOf(values: number[]): [number, number] | null {
   const lit = values.filter((v) => v > 0).sort((a, b) => a - b);
   if (lit.length < 8) return null;
   const at = (share: number) => lit[Math.floor((lit.length - 1) * share)];
-  const high = at(0.98);
-  const low = Math.max(at(0.02), high / 3000);
+  const high = Math.min(at(0.98), ABOVE * at(0.5));
+  const low = Math.max(at(0.02), at(0.5) / BELOW);
   const round = (x: number, up: boolean) => {
     const decade = 10 ** Math.floor(Math.log10(x));
     const steps = [1, 1.5, 2, 3, 5, 7, 10];

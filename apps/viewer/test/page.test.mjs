@@ -194,6 +194,82 @@ test('a working plane lies in the air of the room, as `measure` has it, and foll
   await page.context().close();
 });
 
+test('what is laid is shown in the panel by itself, and its numbers do not lie behind the scale', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  /** Whether all of it is on the screen. */
+  const isSeen = (selector) => page.locator(selector).evaluate((element) => {
+    const [box, panel] = [element.getBoundingClientRect(), element.closest('.panel').getBoundingClientRect()];
+    return box.height > 0 && box.top >= panel.top && box.bottom <= panel.bottom + 1;
+  });
+  assert.equal(await page.locator('#grid').evaluate(({ open }) => open), false);
+  await page.evaluate(() => {
+    window.radiosity.app.pick(0, -0.9);
+    document.querySelector('.panel').scrollTop = 0;
+  });
+  await page.keyboard.press('g');
+  await page.waitForTimeout(300);
+  assert.equal(await isSeen('#grid .facts'), true);
+  // Who scrolls away stays there while the numbers follow.
+  await page.evaluate(() => {
+    document.querySelector('.panel').scrollTop = 0;
+    window.radiosity.app.tell('grid');
+  });
+  assert.equal(await isSeen('#grid .facts'), false);
+
+  // From above, part of the grid is seen in the corner where the scale is.
+  const behind = () => page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.showFalseColours(true);
+    const { camera } = app.stage;
+    const [a, b] = app.grid.points.map(({ point }) => point);
+    const span = a.distanceTo(b);
+    camera.position.copy(app.grid.points[0].point);
+    camera.position.y += 8 * span;
+    camera.lookAt(app.grid.points[0].point);
+    // Its first point is moved from the middle of the picture into the corner.
+    camera.translateX(0.72 * 8 * span * Math.tan((camera.fov * Math.PI) / 360) * camera.aspect);
+    camera.translateY(0.5 * 8 * span * Math.tan((camera.fov * Math.PI) / 360));
+    camera.updateMatrixWorld();
+    app.stage.change();
+    return new Promise((seen) => {
+      setTimeout(() => {
+        const scale = document.querySelector('#legend').getBoundingClientRect();
+        const boxes = [...document.querySelectorAll('.numbers-over span:not([hidden])')].map((span) => span.getBoundingClientRect());
+        const isOver = (box) => box.right > scale.left && box.left < scale.right && box.bottom > scale.top && box.top < scale.bottom;
+        const page = app.stage.canvas.getBoundingClientRect();
+        const points = app.grid.points.map(({ point }) => app.stage.project(point)).filter((at) => at).map(({ x, y }) => [x + page.left, y + page.top]);
+        const there = points.filter(([x, y]) => x > scale.left && x < scale.right + 12 && y > scale.top && y < scale.bottom);
+        seen([boxes.filter(isOver).length, boxes.length, there.length]);
+      }, 800);
+    });
+  });
+  const [over, all, there] = await behind();
+  await picture(page, 'grid-scale');
+  assert.ok(all > 3 && there > 0, `${over} ${all} ${there}`);
+  assert.equal(over, 0, 'numbers behind the scale');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('the scale of false colours fits what is seen, whatever shines behind a window or lies in the dark', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const range = (illuminance) => page.evaluate((illuminance) => {
+    const { app } = window.radiosity;
+    app.stage.metering = async () => ({ luminance: [], illuminance });
+    app.exposure.meter();
+    return new Promise((seen) => { setTimeout(() => seen(app.exposure.range), 700); });
+  }, illuminance);
+  // Eight parts of the picture are a room of 100 to 500 lx; one is a garden, one is night.
+  const room = Array.from({ length: 80 }, (_, i) => 100 * 5 ** (i / 80));
+  const alone = await range(room);
+  const beside = await range([...room, ...Array(10).fill(30_000), ...Array(10).fill(0.01)]);
+  assert.ok(alone[0] > 50 && alone[1] <= 500, `${alone}`);
+  assert.ok(beside[0] >= 5 && beside[1] <= 3000, `${beside}`);
+  await page.context().close();
+});
+
 test('two pages see the same, and one that lost its connection catches up', async () => {
   const [one, two] = await Promise.all([pages.open(program.url), pages.open(program.url)]);
   await Promise.all([done(one), done(two)]);
@@ -372,6 +448,11 @@ test('a narrow screen that is touched', async () => {
   await done(page);
   await page.touchscreen.tap(200, 300);
   await page.waitForFunction(() => window.radiosity.state().selected !== null);
+  // The panel is folded: what a tap measures stands over the picture, at the place.
+  await page.locator('#reading').waitFor();
+  const [text, box] = [await page.locator('#reading').innerText(), await page.locator('#reading').boundingBox()];
+  assert.match(text, /^[\d.,]+ lx$/);
+  assert.ok(box.x < 200 && box.x + box.width > 200 && box.y + box.height < 300 && box.y > 200, JSON.stringify(box));
   // All of the bar is there, and can be hit.
   for (const name of ['Walk', 'Orbit', 'Undo', 'Redo', 'Save', '?', 'Panel']) {
     const box = await page.locator('header').getByText(name, { exact: true }).or(page.locator(`header [aria-label="${name}"]`)).boundingBox();
