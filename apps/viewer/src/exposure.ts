@@ -21,13 +21,16 @@ export class Exposure {
   range: [number, number] = [10, 1000];
   isRangeAutomatic = true;
   levels: number[] = [];
+  /** What the meter saw last, and from where. */
+  seen: { picture: Float32Array; view: string } | null = null;
   private wanted = 0;
   private isDue = false;
   private last = 0;
   private hasLight = false;
   /** What it was before the first change in this view; not higher until the camera moves. */
   private most: number | null = null;
-  private view = '';
+  /** From where one looks. */
+  view = '';
 
   constructor(private stage: Stage, private changed: () => void) {
     this.scale([10, 1000]);
@@ -110,11 +113,13 @@ export class Exposure {
   }
 
   private async look(): Promise<void> {
+    const { view } = this;
     const seen = await this.stage.metering();
     if (!seen) {
       this.isDue = true;
       return;
     }
+    this.seen = { picture: seen.picture, view };
     // In the dark eyes stay as they are.
     if (this.isAutomatic && seen.luminance.length > 0) {
       seen.luminance.sort((a, b) => a - b);

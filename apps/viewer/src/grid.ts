@@ -107,23 +107,27 @@ export function lay({ surface, triangle }: Hit): Grid | null {
   return grid;
 }
 
+/** Illuminance at a point of a triangle, in the light that is shown now, lx. */
+export function luxAt(surface: Surface, triangle: number, [v, w]: [number, number]): number {
+  const values = surface.light.array as Uint16Array;
+  const index = surface.geometry.index!;
+  const light = [0, 0, 0];
+  [1 - v - w, v, w].forEach((weight, k) => {
+    const at = 3 * index.getX(3 * triangle + k);
+    for (let band = 0; band < 3; band += 1) light[band] += weight * UNIT * DataUtils.fromHalfFloat(values[at + band]);
+  });
+  return luminance(light);
+}
+
 /** Reads a grid where its surface is now, in the light that is shown now. */
 export function read(grid: Grid): void {
   const { surface } = grid;
-  const values = surface.light.array as Uint16Array;
-  const index = surface.geometry.index!;
   for (const point of grid.points) {
     const [v, w] = point.uv;
-    const weights = [1 - v - w, v, w];
     const [a, b, c] = corners(surface, point.triangle).map((corner) => corner.applyMatrix4(surface.matrixWorld));
-    point.point.copy(a).multiplyScalar(weights[0]).addScaledVector(b, v).addScaledVector(c, w);
+    point.point.copy(a).multiplyScalar(1 - v - w).addScaledVector(b, v).addScaledVector(c, w);
     grid.normal.copy(b.sub(a).cross(c.sub(a)).normalize());
-    const light = [0, 0, 0];
-    weights.forEach((weight, k) => {
-      const at = 3 * index.getX(3 * point.triangle + k);
-      for (let band = 0; band < 3; band += 1) light[band] += weight * UNIT * DataUtils.fromHalfFloat(values[at + band]);
-    });
-    point.lux = luminance(light);
+    point.lux = luxAt(surface, point.triangle, point.uv);
   }
   const lux = grid.points.map((point) => point.lux);
   grid.mean = lux.reduce((a, b) => a + b, 0) / lux.length;

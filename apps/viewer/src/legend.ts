@@ -1,6 +1,7 @@
 // The scale of false colours, and the numbers of a grid, over the picture.
 import { Vector3 } from 'three';
 import type { App } from './app';
+import { places } from './isolines';
 import { el } from './panels/parts';
 import { layerName } from './panels/view';
 import { measured } from './plane';
@@ -75,8 +76,8 @@ function drawScale(app: App, pen: CanvasRenderingContext2D, tall: number): void 
 /** Most numbers that are written on the picture. */
 const WRITTEN = 150;
 
-/** Numbers at the points of a grid; they follow the camera. */
-export function gridNumbers(app: App): { element: HTMLElement; update(): void } {
+/** Numbers at places of the scene; they follow the camera. `rise` is how far they stand above them, in their own height. */
+function numbersAt(app: App, rise: number): { element: HTMLElement; put(points: { point: Vector3; lux: number }[]): void; update(): void } {
   const element = el('div', { class: 'numbers-over', 'aria-hidden': 'true' });
   let spans: { span: HTMLElement; point: Vector3 }[] = [];
   let last = '';
@@ -99,18 +100,44 @@ export function gridNumbers(app: App): { element: HTMLElement; update(): void } 
       span.hidden = !isFree;
       if (!at || !isFree) continue;
       taken.push([at.x, at.y]);
-      span.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -130%)`;
+      span.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, ${-50 - rise}%)`;
     }
   };
   // The scale comes and goes, and is as wide as its numbers.
   app.on('view', () => { last = ''; });
-  app.on('grid', () => {
+  const put = (points: { point: Vector3; lux: number }[]) => {
     last = '';
-    const points = measured(app);
     const every = Math.ceil(points.length / WRITTEN) || 1;
     spans = points.filter((_, i) => i % every === 0).map(({ point, lux }) => ({ point, span: el('span', {}, readable(lux)) }));
     element.replaceChildren(...spans.map(({ span }) => span));
     update();
-  });
+  };
+  return { element, put, update };
+}
+
+/** Numbers at the points of a grid. */
+export function gridNumbers(app: App): { element: HTMLElement; update(): void } {
+  const { element, put, update } = numbersAt(app, 80);
+  app.on('grid', () => put(measured(app)));
   return { element, update };
+}
+
+/** Numbers on isolines, but where there are those of a grid. They are found anew when one stands still. */
+export function lineNumbers(app: App): { element: HTMLElement; update(): void } {
+  const { element, put, update } = numbersAt(app, 0);
+  let last: unknown[] = [];
+  return {
+    element,
+    update() {
+      const { exposure } = app;
+      const isShown = shared.isolines.value && measured(app).length === 0;
+      const now = [isShown, exposure.seen, exposure.levels];
+      const isStill = exposure.seen?.view === exposure.view;
+      if (now.some((one, i) => one !== last[i]) && (!isShown || isStill)) {
+        last = now;
+        put(isShown ? places(app) : []);
+      }
+      update();
+    },
+  };
 }

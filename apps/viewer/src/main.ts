@@ -2,7 +2,7 @@
 import './style.css';
 import { App } from './app';
 import { helpDialog, listen } from './keys';
-import { gridNumbers, legend } from './legend';
+import { gridNumbers, legend, lineNumbers } from './legend';
 import { bar, duration } from './panels/bar';
 import { camerasPanel } from './panels/cameras';
 import { lightsPanel } from './panels/lights';
@@ -34,10 +34,11 @@ function start(): void {
   const told = el('span', { id: 'told', class: 'unseen', role: 'status' });
   const message = el('span', { id: 'message', role: 'alert' });
   const numbers = gridNumbers(app);
+  const lines = lineNumbers(app);
   const read = reading(app);
   const cross = el('div', { class: 'cross', 'aria-hidden': 'true' });
   const veil = el('div', { class: 'veil' }, el('p', {}, 'Opening …'));
-  const view = el('main', {}, app.stage.canvas, cross, numbers.element, read.element, legend(app), stick(app), veil);
+  const view = el('main', {}, app.stage.canvas, cross, numbers.element, lines.element, read.element, legend(app), stick(app), veil);
   document.body.append(bar(app, { help: () => help.showModal(), fold }), view, panel, el('footer', {}, doing, told, el('span', { class: 'grow' }), message), help);
   if (innerWidth < NARROW) fold();
   listen(app, { help, fold });
@@ -87,6 +88,7 @@ function start(): void {
     app.exposure.update(now, passed);
     app.stage.draw(now);
     numbers.update();
+    lines.update();
     read.update();
     requestAnimationFrame(tick);
   };

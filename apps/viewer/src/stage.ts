@@ -37,12 +37,14 @@ const IN_A_ROW = 4;
 const REST = 250;
 
 /** The picture that the meter sees. */
-const METER = [64, 40];
+export const METER = [64, 40];
 
 /** What the meter saw: luminance and illuminance of the pixels that show a surface. */
 export interface Metered {
   luminance: number[];
   illuminance: number[];
+  /** Illuminance of all pixels, row by row from below; 0 where there is no surface. */
+  picture: Float32Array;
 }
 
 export class Stage {
@@ -333,11 +335,12 @@ export class Stage {
     const pixels = new Float32Array(4 * METER[0] * METER[1]);
     await this.renderer.readRenderTargetPixelsAsync(this.meter, 0, 0, METER[0], METER[1], pixels);
     this.isMetering = false;
-    const seen: Metered = { luminance: [], illuminance: [] };
+    const seen: Metered = { luminance: [], illuminance: [], picture: new Float32Array(METER[0] * METER[1]) };
     for (let i = 0; i < pixels.length; i += 4) {
       if (pixels[i + 3] < 0.5) continue;
       if (pixels[i] > 0) seen.luminance.push(pixels[i]);
       if (pixels[i + 1] > 0) seen.illuminance.push(pixels[i + 1]);
+      seen.picture[i / 4] = pixels[i + 1];
     }
     return seen;
   }

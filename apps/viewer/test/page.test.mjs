@@ -257,7 +257,7 @@ test('the scale of false colours fits what is seen, whatever shines behind a win
   await done(page);
   const range = (illuminance) => page.evaluate((illuminance) => {
     const { app } = window.radiosity;
-    app.stage.metering = async () => ({ luminance: [], illuminance });
+    app.stage.metering = async () => ({ luminance: [], illuminance, picture: new Float32Array(64 * 40) });
     app.exposure.meter();
     return new Promise((seen) => { setTimeout(() => seen(app.exposure.range), 700); });
   }, illuminance);
@@ -267,6 +267,45 @@ test('the scale of false colours fits what is seen, whatever shines behind a win
   const beside = await range([...room, ...Array(10).fill(30_000), ...Array(10).fill(0.01)]);
   assert.ok(alone[0] > 50 && alone[1] <= 500, `${alone}`);
   assert.ok(beside[0] >= 5 && beside[1] <= 3000, `${beside}`);
+  await page.context().close();
+});
+
+test('isolines have their numbers where they are', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  await page.keyboard.press('i');
+  await page.locator('.numbers-over span:visible').nth(4).waitFor();
+  await picture(page, 'isolines');
+  const written = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const page = app.stage.canvas.getBoundingClientRect();
+    return [...document.querySelectorAll('.numbers-over span:not([hidden])')].map((span) => {
+      const box = span.getBoundingClientRect();
+      const [x, y] = [box.left + box.width / 2 - page.left, box.top + box.height / 2 - page.top];
+      const hit = app.stage.pick((2 * x) / page.width - 1, 1 - (2 * y) / page.height);
+      const point = app.stage.toScene(hit.point);
+      const normal = hit.normal.clone();
+      return [Number(span.textContent.replace(',', '')), window.radiosity.lux([...point.toArray(), ...normal.toArray()]), app.exposure.levels];
+    });
+  });
+  for (const [number, lux, levels] of written) {
+    assert.ok(levels.some((level) => Math.abs(level / number - 1) < 1e-3), `${number}`);
+    assert.ok(Math.abs(lux / number - 1) < 0.05, `${lux} lx where ${number} stands`);
+  }
+  console.log(`${written.length} numbers on isolines, off by up to ${(100 * Math.max(...written.map(([number, lux]) => Math.abs(lux / number - 1)))).toFixed(1)} %`);
+  // They go with the lines, and make place for a grid.
+  await page.evaluate(() => {
+    window.radiosity.app.pick(0, -0.9);
+    window.radiosity.app.measure();
+  });
+  const counts = () => page.locator('.numbers-over').evaluateAll((all) => all.map((one) => one.children.length));
+  await page.waitForFunction(() => document.querySelectorAll('.numbers-over')[1].children.length === 0);
+  assert.ok((await counts())[0] > 4);
+  await page.evaluate(() => window.radiosity.app.clearGrid());
+  await page.waitForFunction(() => document.querySelectorAll('.numbers-over')[1].children.length > 4);
+  await page.keyboard.press('i');
+  await page.waitForFunction(() => document.querySelectorAll('.numbers-over')[1].children.length === 0);
+  assert.deepEqual(page.faults, []);
   await page.context().close();
 });
 
