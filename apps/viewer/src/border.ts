@@ -3,8 +3,8 @@
 // are drawn a tenth of a pixel beyond their borders instead, where the neighbour's are, too.
 
 /** Pixels by which borders are drawn farther out: more than places on the screen are rounded by (graphics hardware may do so to
- *  1/16), and too few to be seen. Faces seen at an angle go as far:
- *  with less, by how narrow they look, cracks in hedges opened again. */
+ *  1/16), and too few to be seen. Faces seen at an angle go as far: with less, by how narrow they look, cracks in hedges opened
+ *  again. */
 const BEYOND = 0.1;
 
 /** Moves what is drawn at the border of a surface: `at` is where it is in clip space, `way` what one more `outward` adds to that. */

@@ -9,7 +9,7 @@ use radiosity_scene::{Bands, Side};
 use radiosity_trace::Tracer;
 use radiosity_view::Audit;
 use radiosity_view::lightmap::{
-    Atlas, Charts, Detail, SeamInfo, SeamParams, SharedEdge, Texel, UnwrapInput, UnwrapParams, fill, fit_seams,
+    Atlas, Charts, Detail, Pooled, SeamInfo, SeamParams, SharedEdge, Texel, UnwrapInput, UnwrapParams, fill, fit_seams,
     look_up, shared_edges,
 };
 use rayon::prelude::*;
@@ -21,7 +21,8 @@ const EDGE_CONTRAST: f64 = 0.1;
 /// How many points: stairs of 1/16 are below what a display shows.
 const EDGE_POINTS: u32 = 16;
 
-/// A texel that keeps less of its own light than this when it is pooled has the same indirect light at all its points.
+/// A texel that keeps less of its own light than this when it is pooled has the same indirect light at all its points. At 0 all
+/// points of edges would gather, which takes most of the time; at 1 gaps narrower than a texel would be lit by its middle.
 const SMOOTH: f32 = 0.5;
 
 /// Points that are lit at a time.
@@ -40,12 +41,10 @@ pub(crate) struct Canvas<'b, 'a> {
     index: HashMap<(usize, Side), usize>,
 }
 
-/// Light of texels, lx per band; the indirect part is not a number inside solids.
+/// Light of texels, not a number inside solids, and what was gathered of it where that is smooth; lx per band.
 struct Lit {
-    direct: Vec<Bands>,
-    indirect: Vec<Bands>,
-    /// Standard error of the indirect part; nothing where it is not gathered.
-    noise: Vec<Bands>,
+    light: Vec<Bands>,
+    smooth: Vec<Option<Bands>>,
 }
 
 /// A canvas with its light.
@@ -112,18 +111,11 @@ impl<'b, 'a> Canvas<'b, 'a> {
             };
             let fresh: Vec<Texel> = texels.iter().zip(&known).filter(|(_, e)| e.is_none()).map(|(t, _)| *t).collect();
             lit += fresh.len();
-            let answer = self.light(&fresh, judge, monitor)?;
             let at = |t: &Texel| usize::from(t.y) * size[0] as usize + usize::from(t.x);
-            let mut gathered = HashMap::new();
-            let mut indirect = answer.indirect;
-            if judge.gathers() {
-                let pooled = atlas.pooled(page, &fresh, &indirect, &answer.noise);
-                indirect = pooled.iter().map(|p| p.light).collect();
-                // Where that is smooth, points of a texel differ by the edges of shadows alone.
-                let smooth = fresh.iter().zip(&pooled).filter(|(_, p)| p.own < SMOOTH);
-                gathered.extend(smooth.map(|(texel, p)| (at(texel), p.light)));
-            }
-            let mut fresh = answer.direct.iter().zip(&indirect).map(|(d, h)| [0, 1, 2].map(|k| d[k] + h[k]));
+            let Lit { light, smooth } = self.light(&atlas, page, &fresh, judge, monitor)?;
+            let smooth: HashMap<usize, Bands> =
+                fresh.iter().zip(smooth).filter_map(|(texel, light)| Some((at(texel), light?))).collect();
+            let mut fresh = light.into_iter();
             let mut values: Vec<Bands> = known.iter().filter_map(|e| e.or_else(|| fresh.next())).collect();
             let mut points = texels.clone();
             // What is known gets no more points: it counts twice.
@@ -140,8 +132,8 @@ impl<'b, 'a> Canvas<'b, 'a> {
                 }
                 // In portions, as they may be many times as many as the texels.
                 for some in more.chunks(PORTION) {
-                    let known: Vec<_> = some.iter().map(|texel| gathered.get(&at(texel)).copied()).collect();
-                    values.extend(self.light_edges(some, &known, judge, monitor)?);
+                    let indirect: Vec<_> = some.iter().map(|texel| smooth.get(&at(texel)).copied()).collect();
+                    values.extend(self.light_edges(some, &indirect, judge, monitor)?);
                 }
                 points.extend(more);
             }
@@ -178,33 +170,53 @@ impl<'b, 'a> Canvas<'b, 'a> {
         look_up(drawn.atlas.pages[page], &drawn.irradiance[page], a + at.x * (b - a) + at.y * (c - a))
     }
 
-    /// Every texel is lit like a point of the surface; those inside solids are left to their neighbours.
-    fn light(&self, texels: &[Texel], judge: &Judge, monitor: &dyn Monitor) -> Result<Lit, Error> {
+    /// Every texel is lit like a point of the surface; those inside solids are left to their neighbours. What is gathered is pooled:
+    /// where that is smooth, points of a texel differ by the edges of shadows alone.
+    fn light(
+        &self,
+        atlas: &Atlas,
+        page: usize,
+        texels: &[Texel],
+        judge: &Judge,
+        monitor: &dyn Monitor,
+    ) -> Result<Lit, Error> {
         let at = self.stations(texels);
         let Answer { irradiance, direct, standard_error } = judge.light(&at, 1, monitor)?;
-        let indirect = irradiance.iter().zip(&direct).zip(&at).map(|((e, d), station)| {
-            if is_hidden(self.solution, station) { [f32::NAN; 3] } else { std::array::from_fn(|k| e[k] - d[k]) }
-        });
-        Ok(Lit { indirect: indirect.collect(), direct, noise: standard_error })
+        let hidden: Vec<bool> = at.iter().map(|station| is_hidden(self.solution, station)).collect();
+        let unless_hidden = |i: usize, e: Bands| if hidden[i] { [f32::NAN; 3] } else { e };
+        if !judge.gathers() {
+            let light = irradiance.iter().enumerate().map(|(i, e)| unless_hidden(i, *e)).collect();
+            return Ok(Lit { light, smooth: vec![None; texels.len()] });
+        }
+        let difference = |i: usize| std::array::from_fn(|k| irradiance[i][k] - direct[i][k]);
+        let indirect: Vec<Bands> = (0..texels.len()).map(|i| unless_hidden(i, difference(i))).collect();
+        let pooled = atlas.pooled(page, texels, &indirect, &standard_error);
+        let smooth = pooled.iter().map(|p| (p.own < SMOOTH).then_some(p.light)).collect();
+        let sum = |(d, p): (&Bands, &Pooled)| std::array::from_fn(|k| d[k] + p.light[k]);
+        Ok(Lit { light: direct.iter().zip(&pooled).map(sum).collect(), smooth })
     }
 
     /// Further points of texels, whose indirect light may be known.
     fn light_edges(
         &self,
         points: &[Texel],
-        known: &[Option<Bands>],
+        indirect: &[Option<Bands>],
         judge: &Judge,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
         let at = self.stations(points);
-        let (smooth, rest): (Vec<usize>, Vec<usize>) = (0..points.len()).partition(|i| known[*i].is_some());
+        let (smooth, rest): (Vec<usize>, Vec<usize>) = (0..points.len()).partition(|i| indirect[*i].is_some());
         let of = |chosen: &[usize]| -> Vec<Station> { chosen.iter().map(|i| at[*i]).collect() };
         let mut values = vec![[f32::NAN; 3]; points.len()];
-        for (i, direct) in smooth.iter().zip(judge.direct(&of(&smooth), EDGE_POINTS, monitor)?) {
-            values[*i] = std::array::from_fn(|k| direct[k] + known[*i].map_or(0.0, |light| light[k]));
+        if !smooth.is_empty() {
+            for (i, direct) in smooth.iter().zip(judge.direct(&of(&smooth), EDGE_POINTS, monitor)?) {
+                values[*i] = std::array::from_fn(|k| direct[k] + indirect[*i].map_or(0.0, |light| light[k]));
+            }
         }
-        for (i, light) in rest.iter().zip(judge.light(&of(&rest), EDGE_POINTS, monitor)?.irradiance) {
-            values[*i] = light;
+        if !rest.is_empty() {
+            for (i, light) in rest.iter().zip(judge.light(&of(&rest), EDGE_POINTS, monitor)?.irradiance) {
+                values[*i] = light;
+            }
         }
         for (value, _) in values.iter_mut().zip(&at).filter(|(_, station)| is_hidden(self.solution, station)) {
             *value = [f32::NAN; 3];

@@ -2,10 +2,11 @@
 //! back, and what has to become finer for the error asked.
 //!
 //! The square of the error as read back is the solution's own, at the points that are lit, plus what is lost between them.
-//! Finer texels lessen the second alone; so where the first leaves too little room, points are lit with more rays before.
+//! Finer texels lessen the second alone; so where the first leaves too little room, points are lit with more rays before, and places
+//! where they are read back stand for what points make of their rays together.
 
 use crate::answer::{Answer, Station};
-use crate::bake::{Baked, GATHERS, gather_rays};
+use crate::bake::{Baked, GATHERS, SHADOW_RAYS, gather_rays};
 use crate::measure::{brought_nothing, certify, most_paths};
 use crate::{Error, Indirect, Monitor, Solution, stations};
 use radiosity_scene::{Bands, luminance};
@@ -34,11 +35,11 @@ pub(crate) fn is_stalled(rounds: &[WrittenRound]) -> bool {
     brought_nothing(&rounds.iter().map(|round| round.error).collect::<Vec<_>>())
 }
 
-/// Fewest shadow rays and gather rays at a point that is one of many.
+/// Fewest shadow rays, and gather rays, at a point that is one of many.
 const LEAST_RAYS: u32 = 8;
-const LEAST_GATHER: usize = 8;
 
-/// Fewest gather rays at a point that shares with others: of small things there are few to share with.
+/// Gather rays at a point that shares with others, at least, unless the error allows for fewer: small things have few texels to
+/// share with, and half as many rays would leave theirs as different as checks are.
 const LEAST_POOLED: usize = 64;
 
 /// One attempt at writing light so that it is read back as well as was asked.
@@ -81,7 +82,7 @@ pub(crate) struct Judge<'b, 'a> {
     auditor: Auditor<'a>,
     gather: usize,
     shadowing: Shadowing,
-    /// How many times fewer rays do for points that are written: they share theirs with those around them.
+    /// How many times fewer gather rays do for points that are written: they share theirs with those around them.
     pooled: usize,
     /// The solution's light at the places of the audit.
     at: Vec<Bands>,
@@ -120,7 +121,7 @@ impl<'b, 'a> Judge<'b, 'a> {
     /// # Errors
     /// [`Error::Stopped`].
     pub fn light(&self, stations: &[Station], of: u32, monitor: &dyn Monitor) -> Result<Answer, Error> {
-        let gather = if self.gathers() { (self.written().0 / of as usize).max(LEAST_GATHER) } else { 0 };
+        let gather = if self.gathers() { (self.written() / of as usize).max(LEAST_RAYS as usize) } else { 0 };
         self.lit(stations, gather, &self.shared(of), monitor)
     }
 
@@ -155,16 +156,15 @@ impl<'b, 'a> Judge<'b, 'a> {
         Ok(self.lit(places, self.gather, &self.shadowing, monitor)?.irradiance)
     }
 
-    /// Gather and shadow rays of a point that is written, and no other with it.
-    fn written(&self) -> (usize, u32) {
-        let first = gather_rays(self.baked.error).min(LEAST_POOLED).max(self.baked.gather);
-        let shadow_rays = (self.shadowing.rays / self.pooled as u32).max(self.baked.shadowing.rays);
-        ((self.gather / self.pooled).max(first), shadow_rays)
+    /// Gather rays of a point that is written alone.
+    fn written(&self) -> usize {
+        let least = gather_rays(self.baked.error).min(LEAST_POOLED).max(self.baked.gather);
+        (self.gather / self.pooled).max(least)
     }
 
     /// Shadow rays of each of so many points.
     fn shared(&self, of: u32) -> Shadowing {
-        let rays = self.written().1;
+        let rays = self.shadowing.rays;
         let rays = if of > 1 { (rays / of).max(LEAST_RAYS) } else { rays };
         Shadowing { rays, ..self.shadowing }
     }
@@ -231,12 +231,16 @@ impl<'b, 'a> Judge<'b, 'a> {
         if upper <= enough || std::mem::replace(&mut self.is_relit, true) {
             return Ok(false);
         }
-        let written = |judge: &Judge| (judge.gathers(), judge.written());
+        let written = |judge: &Judge| (judge.gathers(), judge.written(), judge.shadowing.rays);
         let (mut is_better, before) = (false, written(self));
         let (mut gather, mut shadowing) = (self.gather, self.shadowing);
         for _ in 0..GATHERS {
             gather = (2 * gather).max(gather_rays(self.baked.error));
-            shadowing.rays *= 2;
+            // Points that pool have shadow rays in proportion to what they gather: direct light is not shared.
+            shadowing.rays = match self.pooled {
+                1 => 2 * shadowing.rays,
+                pooled => shadowing.rays.max(SHADOW_RAYS * (gather / pooled) as u32),
+            };
             let kept = (self.gather, self.shadowing);
             (self.gather, self.shadowing) = (gather, shadowing);
             let at = self.at_places(&self.baked.watched, monitor)?;

@@ -76,13 +76,15 @@ const MOST_GROWTH: f64 = 20.0;
 /// How many times as many texels as at first are lit in a round at most: it takes as many times as long then.
 const MOST_LIT: f64 = 3.0;
 
-/// How much more of the squared error a round leaves if it would light too many texels.
+/// How much more of the squared error a round leaves if it would light too many texels: with 3 it would light half as many as it
+/// may.
 const STEP_BACK: f64 = 1.5;
 
 /// Rounds after the first map: two or three of finer texels, one to mend what the estimate had wrong.
 const ROUNDS: usize = 4;
 
-/// How many times the rays texels that pool theirs are worth at least, on surfaces that are wider than a few of them.
+/// Gathered light of a texel that is pooled has the noise of so many times its rays at least, on surfaces wider than a few texels:
+/// on walls, of thirty times as many. More would leave small things unlike each other, less would light all texels anew.
 const POOLED: usize = 4;
 
 /// Texels of so many charts where no density is asked for.

@@ -67,7 +67,7 @@ fn sheets(random: &mut Random) -> Enclosure {
     scene
 }
 
-fn main() {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut random = Random::new(11);
     let sheets: Vec<Enclosure> = (0..100).map(|_| sheets(&mut random)).collect();
     for (name, scenes, accuracies) in
@@ -80,7 +80,7 @@ fn main() {
                     let options = ViewFactorOptions { accuracy, ..ViewFactorOptions::default() };
                     view_factors(scene, &options, &())
                 };
-                let (Ok(found), Ok(truth)) = (solve(accuracy), solve(0.02 * accuracy)) else { return };
+                let (found, truth) = (solve(accuracy)?, solve(0.02 * accuracy)?);
                 for (i, j, value, error) in found.entries().filter(|(.., error)| *error > 1e-9) {
                     let area = found.areas()[i];
                     let truth = truth.factor(i, j);
@@ -97,4 +97,5 @@ fn main() {
             );
         }
     }
+    Ok(())
 }

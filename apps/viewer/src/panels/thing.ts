@@ -6,6 +6,9 @@ import { brighter, LAMPS, type LampKind, remade, solidAngle } from '../lamps';
 import { luminance } from '../luminance';
 import { button, choice, el, hex, isOpen, linear, section } from './parts';
 
+/** As much as a surface may reflect: with 1 in a closed room light would never end. */
+const most = (reflectance: number[]) => reflectance.map((r) => Math.min(0.99, r));
+
 export function thingPanel(app: App): HTMLElement {
   let gesture: number | null = null;
   const name = el('b', { class: 'title' });
@@ -16,7 +19,7 @@ export function thingPanel(app: App): HTMLElement {
   const repaint = (isLast: boolean) => {
     if (app.selected === null) return;
     gesture ??= app.nextGesture();
-    app.paint(app.selected, linear(paint.value), gesture);
+    app.paint(app.selected, most(linear(paint.value)), gesture);
     if (isLast) gesture = null;
   };
   const reflectance = el('input', { type: 'number', min: 0, max: 99, step: 1, 'aria-label': 'Mean reflectance, percent', change: () => rescale() });
@@ -26,7 +29,7 @@ export function thingPanel(app: App): HTMLElement {
     if (!object || !(wanted >= 0)) return;
     const now = luminance(object.reflectance);
     const scaled = now > 1e-4 ? object.reflectance.map((r) => (r * wanted) / now) : [wanted, wanted, wanted];
-    app.paint(object.id, scaled.map((r) => Math.min(0.99, r)));
+    app.paint(object.id, most(scaled));
   };
   const places = ['X', 'Y', 'Z'].map((axis, k) => el('input', {
     type: 'number', step: 0.05, 'aria-label': `${axis}, metres`, title: `${axis}, metres; the middle of its foot`, change: () => put(k),

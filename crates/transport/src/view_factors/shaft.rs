@@ -220,8 +220,8 @@ impl<'a> Shaft<'a> {
         part
     }
 
-    /// Finds more sides of the hull of two polygons, first those at edges of one and then of the other; whether there were more to
-    /// find.
+    /// Finds more sides of the hull of two polygons, first those at edges of one and then of the other; whether there were
+    /// more to find.
     fn find_sides(&mut self) -> bool {
         let [a, b] = self.ends;
         let (own, other, normal) = match self.ends_done {
@@ -312,7 +312,8 @@ impl Crossings {
     /// Segments between corners on either side.
     #[inline(always)]
     fn between(&mut self, [high, low]: Slopes, [other_high, other_low]: Slopes) {
-        // None on a side is infinite, and nothing crosses.
+        // None on a side is infinite, and nothing crosses. Of a corner in the plane it may be, too, and −∞ + ∞ is no number: there
+        // neither holds, as `in_plane` finds.
         self.outside &= high + other_high <= 0.0;
         self.within &= low + other_low >= 0.0;
     }

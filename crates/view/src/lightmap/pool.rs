@@ -17,13 +17,15 @@ const RADII: [usize; 5] = [1, 2, 4, 8, 16];
 /// Radius over which predictions of a texel are compared: 81 texels tell which of two planes a fifth of the noise apart is better.
 const COMPARED: usize = 4;
 
-/// Radius over which chosen radii are evened out, so that no texel differs from the next by the choice alone.
+/// Radius over which chosen radii are evened out: at 0 neighbours differ by the choice alone, and much more carries the radius of
+/// smooth light into contacts.
 const EVENED: usize = 2;
 
 /// Fewest texels that a plane is laid through.
 const FEWEST: f64 = 4.0;
 
-/// A texel that has more of a plane to itself than this is not predicted by the others.
+/// A texel that has more of a plane to itself than this, at the end of a row, is not predicted by the others: what it is off is
+/// divided by what is left.
 const ALONE: f64 = 0.9;
 
 /// Variance of coordinates, texels², that is added along each axis: texels in a row say nothing of the slope across.
@@ -31,22 +33,24 @@ const RIDGE: f64 = 1e-3;
 
 impl Atlas {
     /// Pooled light of `texels` of a page: `values[i]`, lx per band, and its standard error `noise[i]` belong to `texels[i]`, each
-    /// named once. Noise of one texel must not depend on that of another. What is not finite stays as it is.
+    /// named once. What is not finite stays as it is. Noise of one texel must not be that of another: a part that they share is
+    /// taken for light.
     pub fn pooled(&self, page: usize, texels: &[Texel], values: &[Bands], noise: &[Bands]) -> Vec<Pooled> {
+        assert_eq!((texels.len(), texels.len()), (values.len(), noise.len()));
         let mut out: Vec<Pooled> = values.iter().map(|light| Pooled { light: *light, own: 1.0 }).collect();
         let Some(&[width, height]) = self.pages.get(page) else { return out };
-        let mut index = vec![u32::MAX; width as usize * height as usize];
-        for (i, texel) in texels.iter().enumerate().filter(|(i, _)| values[*i].iter().all(|e| e.is_finite())) {
-            index[usize::from(texel.y) * width as usize + usize::from(texel.x)] = i as u32;
+        let mut index = vec![NONE; width as usize * height as usize];
+        for (i, texel) in texels.iter().enumerate() {
+            if values[i].iter().chain(&noise[i]).all(|e| e.is_finite()) {
+                index[usize::from(texel.y) * width as usize + usize::from(texel.x)] = i as u32;
+            }
         }
         let charts: Vec<&Placed> = self.charts.iter().filter(|chart| chart.at.page as usize == page).collect();
         let pooled: Vec<Vec<(usize, Pooled)>> = charts
             .par_iter()
             .map(|chart| {
                 let [columns, rows] = chart.size;
-                let slot = |i: u32| index[chart.slot(i % columns, i / columns, width)];
-                let own: Vec<Option<usize>> =
-                    (0..columns * rows).map(|i| Some(slot(i)).filter(|i| *i != u32::MAX).map(|i| i as usize)).collect();
+                let own = (0..columns * rows).map(|i| index[chart.slot(i % columns, i / columns, width)]).collect();
                 Grid { columns: columns as usize, rows: rows as usize, own }.pooled(values, noise)
             })
             .collect();
@@ -65,11 +69,14 @@ pub struct Pooled {
     pub own: f32,
 }
 
+/// The number of a slot without a texel.
+const NONE: u32 = u32::MAX;
+
 /// The texels of a chart, row-major, by their number.
 struct Grid {
     columns: usize,
     rows: usize,
-    own: Vec<Option<usize>>,
+    own: Vec<u32>,
 }
 
 /// A plane through light, at the texel that it was laid around.
@@ -83,65 +90,72 @@ struct Fit {
 impl Grid {
     /// The texels that have others to share with, and their light.
     fn pooled(&self, values: &[Bands], noise: &[Bands]) -> Vec<(usize, Pooled)> {
-        if (self.own.iter().flatten().count() as f64) < FEWEST {
+        if ((0..self.own.len()).filter_map(|slot| self.texel(slot)).count() as f64) < FEWEST {
             return Vec::new();
         }
-        let moments = Sums::new(self, |i, at| {
-            let [r, g, b] = values[i].map(f64::from);
-            let DVec2 { x, y } = at;
+        let moments = Sums::new(self, |slot| {
+            let Some(own) = self.texel(slot) else { return [0.0; 15] };
+            let ([r, g, b], DVec2 { x, y }) = (values[own].map(f64::from), self.at(slot));
             [1.0, x, y, x * x, x * y, y * y, r, r * x, r * y, g, g * x, g * y, b, b * x, b * y]
         });
-        let variance = Sums::new(self, |i, _| [1.0, f64::from(luminance(noise[i])).powi(2)]);
-        let reach = self.columns.max(self.rows);
-        let tried: Vec<Tried> = RADII
-            .iter()
-            .take_while(|radius| **radius == RADII[0] || **radius < reach)
-            .map(|radius| self.tried(*radius, &moments, values))
-            .collect();
+        let plane = |slot: usize, radius: usize| plane(&moments.within(self, slot, radius), self.at(slot));
 
-        // The radius that predicts best, by its number.
-        let best =
-            |slot: usize| (0..tried.len()).min_by(|a, b| tried[*a].missed[slot].total_cmp(&tried[*b].missed[slot]));
-        let best: Vec<usize> = (0..self.own.len()).map(|slot| best(slot).unwrap_or(0)).collect();
-        let evened = Sums::by_slot(self, |slot| [1.0, best[slot] as f64]);
+        // The radius that predicts best, by its number, and how far its planes are off.
+        let reach = self.columns.max(self.rows) - 1;
+        let mut best = vec![(NOWHERE, f64::INFINITY); self.own.len()];
+        for (k, radius) in RADII.into_iter().enumerate() {
+            let off = Sums::new(self, |slot| self.off(slot, plane(slot, radius), values));
+            for (slot, best) in best.iter_mut().enumerate() {
+                let [count, sum] = off.within(self, slot, COMPARED);
+                let knows = self.texel(slot).and_then(|_| plane(slot, radius)).is_some();
+                if knows && count > 0.0 && sum / count < best.1 {
+                    *best = (k, sum / count);
+                }
+            }
+            if radius >= reach {
+                break;
+            }
+        }
 
-        let lit = self.own.iter().enumerate().filter_map(|(slot, own)| Some((slot, (*own)?)));
-        lit.filter_map(|(slot, i)| {
+        let variance = Sums::new(self, |slot| match self.texel(slot) {
+            Some(own) => [1.0, f64::from(luminance(noise[own])).powi(2)],
+            None => [0.0; 2],
+        });
+        // Texels without a plane have no say in it.
+        let evened =
+            Sums::new(self, |slot| if best[slot].0 == NOWHERE { [0.0; 2] } else { [1.0, best[slot].0 as f64] });
+        let light = |slot: usize| {
+            let (own, (chosen, missed)) = (self.texel(slot)?, best[slot]);
+            if chosen == NOWHERE {
+                return None;
+            }
             let [count, sum] = evened.within(self, slot, EVENED);
             let at = sum / count;
-            let (low, high) = (at.floor() as usize, at.ceil() as usize);
-            let [low, high] = [low, high].map(|k| tried[k].fits[slot].or(tried[best[slot]].fits[slot]));
-            let (low, high, share) = (low?.light, high?.light, at.fract());
-            let missed = tried[best[slot]].missed[slot];
+            let near = |k: f64| Some(plane(slot, RADII[k as usize]).or_else(|| plane(slot, RADII[chosen]))?.light);
+            let (low, high, share) = (near(at.floor())?, near(at.ceil())?, at.fract());
             let [count, sum] = variance.within(self, slot, COMPARED);
             // Of so many texels a variance is known to √(2/n) of itself: less than twice that beyond the noise is chance.
             let noise = sum / count * (1.0 + (8.0 / count).sqrt());
             let kept = if missed > 0.0 { (1.0 - noise / missed).clamp(0.0, 1.0) } else { 0.0 };
             let light = std::array::from_fn(|k| {
                 let shared = low[k] + share * (high[k] - low[k]);
-                (shared + kept * (f64::from(values[i][k]) - shared)).max(0.0) as f32
+                (shared + kept * (f64::from(values[own][k]) - shared)).max(0.0) as f32
             });
-            Some((i, Pooled { light, own: kept as f32 }))
-        })
-        .collect()
+            Some((own, Pooled { light, own: kept as f32 }))
+        };
+        (0..self.own.len()).filter_map(light).collect()
     }
 
-    /// Planes of a radius at all texels, and how far they are off without the texel itself.
-    fn tried(&self, radius: usize, moments: &Sums<15>, values: &[Bands]) -> Tried {
-        let fit = |slot: usize| self.own[slot].and_then(|_| plane(&moments.within(self, slot, radius), self.at(slot)));
-        let fits: Vec<Option<Fit>> = (0..self.own.len()).map(fit).collect();
-        let off = Sums::by_slot(self, |slot| match (fits[slot], self.own[slot]) {
-            (Some(fit), Some(own)) => {
-                let off = f64::from(luminance(values[own])) - f64::from(luminance(fit.light.map(|e| e as f32)));
-                [1.0, (off / (1.0 - fit.share)).powi(2)]
-            }
-            _ => [0.0; 2],
-        });
-        let missed = |slot: usize| match (fits[slot], off.within(self, slot, COMPARED)) {
-            (Some(_), [count, sum]) => sum / count,
-            _ => f64::INFINITY,
-        };
-        Tried { missed: (0..self.own.len()).map(missed).collect(), fits }
+    /// One, and the squared distance of a texel from a plane around it that is laid without it.
+    fn off(&self, slot: usize, plane: Option<Fit>, values: &[Bands]) -> [f64; 2] {
+        let (Some(own), Some(fit)) = (self.texel(slot), plane) else { return [0.0; 2] };
+        let off = f64::from(luminance(values[own])) - f64::from(luminance(fit.light.map(|e| e as f32)));
+        [1.0, (off / (1.0 - fit.share)).powi(2)]
+    }
+
+    /// The number of the texel at a slot.
+    fn texel(&self, slot: usize) -> Option<usize> {
+        Some(self.own[slot] as usize).filter(|_| self.own[slot] != NONE)
     }
 
     /// Where a texel lies, from the middle of the chart.
@@ -151,12 +165,8 @@ impl Grid {
     }
 }
 
-/// What a radius came to.
-struct Tried {
-    fits: Vec<Option<Fit>>,
-    /// Squared distance of texels from the planes through those around them, on average nearby.
-    missed: Vec<f64>,
-}
+/// The number of a radius where none knows anything.
+const NOWHERE: usize = RADII.len();
 
 /// The plane by least squares through texels with these sums, at a place.
 fn plane(sums: &[f64; 15], at: DVec2) -> Option<Fit> {
@@ -184,12 +194,8 @@ struct Sums<const N: usize> {
 }
 
 impl<const N: usize> Sums<N> {
-    /// Of what each lit texel has, given its number and where it lies.
-    fn new(grid: &Grid, of: impl Fn(usize, DVec2) -> [f64; N]) -> Sums<N> {
-        Sums::by_slot(grid, |slot| grid.own[slot].map_or([0.0; N], |own| of(own, grid.at(slot))))
-    }
-
-    fn by_slot(grid: &Grid, of: impl Fn(usize) -> [f64; N]) -> Sums<N> {
+    /// Of what each slot has.
+    fn new(grid: &Grid, of: impl Fn(usize) -> [f64; N]) -> Sums<N> {
         let stride = grid.columns + 1;
         let mut table = vec![[0.0; N]; stride * (grid.rows + 1)];
         for y in 0..grid.rows {
@@ -232,7 +238,7 @@ mod tests {
     }
 
     fn pooled(values: &[Bands], noise: f32) -> Vec<Pooled> {
-        let grid = Grid { columns: SIDE, rows: SIDE, own: (0..SIDE * SIDE).map(Some).collect() };
+        let grid = Grid { columns: SIDE, rows: SIDE, own: (0..(SIDE * SIDE) as u32).collect() };
         let pooled = grid.pooled(values, &vec![[noise; 3]; values.len()]);
         assert!(pooled.iter().enumerate().all(|(i, (number, _))| i == *number));
         pooled.into_iter().map(|(_, p)| p).collect()
@@ -261,6 +267,19 @@ mod tests {
     }
 
     #[test]
+    fn texels_far_between_share_as_well() {
+        let truth = |x: f64, y: f64| 40.0 + 0.3 * x - 0.2 * y;
+        let values = noisy(truth, 4);
+        let own = (0..(SIDE * SIDE) as u32).map(|i| if i % 5 == i / SIDE as u32 % 5 { i } else { NONE }).collect();
+        let pooled = Grid { columns: SIDE, rows: SIDE, own }.pooled(&values, &vec![[1.0; 3]; values.len()]);
+        assert!(pooled.len() > SIDE * SIDE / 6);
+        let off =
+            |(i, p): &(usize, Pooled)| (f64::from(p.light[1]) - truth((i % SIDE) as f64, (i / SIDE) as f64)).powi(2);
+        let all = (pooled.iter().map(off).sum::<f64>() / pooled.len() as f64).sqrt();
+        assert!(all < 0.35, "{all}");
+    }
+
+    #[test]
     fn a_contact_and_an_edge_stay_sharp() {
         // Twenty times as deep as the noise, a texel and a half wide; an edge of forty times the noise.
         let contact = |x: f64, _: f64| 50.0 - 20.0 * (-x / 1.5).exp();
@@ -278,7 +297,7 @@ mod tests {
         let values: Vec<Bands> = (0..SIDE * SIDE).map(|i| [unit(hash(i as u32)); 3]).collect();
         let kept = pooled(&values, 0.0);
         assert!(kept.iter().zip(&values).all(|(p, v)| p.light == *v && p.own == 1.0));
-        let few = Grid { columns: 3, rows: 1, own: (0..3).map(Some).collect() };
+        let few = Grid { columns: 3, rows: 1, own: (0..3).collect() };
         assert!(few.pooled(&values[..3], &values[..3]).is_empty());
     }
 }
