@@ -9,8 +9,8 @@
 //! themselves all the same (a winding ramp) are cut apart.
 //!
 //! The way: [`Charts::new`] lays flat (no density yet), [`Charts::texel_count`] says what a density would cost,
-//! [`Charts::pack`] makes the [`Atlas`], [`Atlas::texels`] the points to evaluate, [`Atlas::finer`] more of them where
-//! shadows end, [`fill`] the picture and [`fit_seams`] lets both sides of a seam agree. Coordinates: u to the right, v down, texel (x, y) centred at
+//! [`Charts::pack`] makes the [`Atlas`], [`Atlas::texels`] the points to evaluate, [`Atlas::pooled`] takes noise from what they
+//! gather, [`Atlas::finer`] gives more of them where shadows end, [`fill`] the picture and [`fit_seams`] lets both sides of a seam agree. Coordinates: u to the right, v down, texel (x, y) centred at
 //! ((x + ½)/width, (y + ½)/height) as in glTF.
 
 mod allot;
