@@ -30,7 +30,7 @@ function save(app: App, blob: Blob, ending: string): string {
 export function screenshot(app: App): void {
   const { canvas } = app.stage;
   const show = app.marks.hide();
-  app.stage.drawNow();
+  app.stage.drawSharp();
   const pen = Object.assign(document.createElement('canvas'), { width: canvas.width, height: canvas.height }).getContext('2d')!;
   // At once: the browser may forget what was drawn when it shows the page.
   pen.drawImage(canvas, 0, 0);

@@ -81,7 +81,8 @@ function start(): void {
 
   let last = performance.now();
   const tick = (now: number) => {
-    const passed = Math.min(100, now - last);
+    // Of a pause no more than this is gone on: one would come out far away.
+    const passed = Math.min(350, now - last);
     last = now;
     app.tellNews();
     app.navigator.update(passed / 1000);

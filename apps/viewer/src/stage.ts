@@ -232,6 +232,12 @@ export class Stage {
     this.frames += 1;
   }
 
+  /** The same with all pixels, however few the last frames had, for a picture that is kept. */
+  drawSharp(): void {
+    this.resize(0);
+    this.drawNow();
+  }
+
   /** The angle of view: on upright screens it holds across, where else the sides would be lost. */
   private widen(): void {
     const half = Math.tan(0.5 * this.fov) / Math.min(1, this.camera.aspect);

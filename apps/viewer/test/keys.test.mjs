@@ -144,3 +144,43 @@ test('groups, menus and lists are as keyboards expect them, and keys of one lett
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });
+
+test('walking leads as far where few pictures are drawn, climbs nothing, and comes out of things', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const walks = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const { camera } = app.stage;
+    const { navigator } = app;
+    const start = camera.position.clone();
+    /** Where one comes to, and how high at most, going in a direction for a time. */
+    const walk = (from, drive, seconds, frame) => {
+      camera.position.copy(from);
+      Object.assign(navigator.drive, drive);
+      let highest = -Infinity;
+      for (let k = 0; k < seconds / frame; k += 1) {
+        navigator.update(frame);
+        highest = Math.max(highest, camera.position.y);
+      }
+      Object.assign(navigator.drive, { right: 0, back: 0 });
+      return { at: camera.position.toArray(), highest, way: camera.position.distanceTo(from) };
+    };
+    const forward = { right: 0, back: -1 };
+    const [short, long] = [1 / 60, 0.35].map((frame) => walk(start, forward, 0.69, frame));
+    // Right before the back wall, as near as nobody walks to it, and at every block.
+    const onto = [-1, -0.5, 0, 0.5, 1].map((right) => walk(start, { right, back: -1 }, 8, 0.35));
+    const wall = camera.position.clone();
+    const hit = app.stage.cast(wall, wall.clone().set(0, 0, -1));
+    if (hit) wall.z -= hit.distance - 0.01 * navigator.scale;
+    const out = walk(wall, { right: 0, back: 1 }, 1.4, 0.35);
+    camera.position.copy(start);
+    return { short, long, onto, out, scale: navigator.scale, eye: short.at[1] };
+  });
+  // Feet come to the floor by and by: on the level alone.
+  const apart = Math.hypot(...[0, 2].map((k) => walks.short.at[k] - walks.long.at[k]));
+  assert.ok(walks.short.way > 0.5 * walks.scale && apart < 0.1 * walks.scale, `${walks.short.way} ${apart}`);
+  for (const { highest } of walks.onto) assert.ok(highest < walks.eye + 0.3 * walks.scale, `${highest}`);
+  assert.ok(walks.out.way > 0.5 * walks.scale, `${walks.out.way}`);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
