@@ -13,7 +13,7 @@ const NODE: u32 = 20;
 const BROWSERS: &[&str] = &["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
 /// The tests, each with a program and a browser of its own.
-const TESTS: &[&str] = &["test/page.test.mjs", "test/edit.test.mjs", "test/keys.test.mjs"];
+const TESTS: &[&str] = &["test/page.test.mjs", "test/edit.test.mjs", "test/keys.test.mjs", "test/walk.test.mjs"];
 
 /// `cargo xtask viewer`.
 pub fn command(arguments: &[&str]) -> Result<String, Fault> {

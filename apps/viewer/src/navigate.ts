@@ -18,8 +18,8 @@ const STEP = 0.16;
 /** Longest way that is gone at a time, metres: by longer ones, where few pictures are drawn, feet would miss what they step on. */
 const STRIDE = 0.1;
 
-/** What is nearer than this share of the width is not in the way: one stands in it, and has to come out. Walking ends farther off. */
-const WITHIN = 0.2;
+/** Way on which feet come nearer to what they step on by a factor of e, metres: at once would jolt. */
+const SETTLE = 0.06;
 
 /** Radians a second by keys, and by each pixel of the pointer, dragged and locked. */
 const TURN = 1.6;
@@ -181,17 +181,20 @@ export class Navigator {
   /** Goes as far as walls let, along them where one goes at them; up and down with the floor. */
   private go(step: Vector3): void {
     const { camera } = this.stage;
-    let left = step.clone();
+    const left = step.clone();
     for (let attempt = 0; attempt < 3 && left.lengthSq() > 1e-12; attempt += 1) {
-      const normal = this.obstacle(left);
-      if (!normal) {
+      const obstacle = this.obstacle(left);
+      if (!obstacle) {
         camera.position.add(left);
         break;
       }
-      // What would go into the wall is lost, what goes along it stays.
-      left = left.clone().addScaledVector(normal, -left.dot(normal));
+      // Up to the wall; of the rest, what would go into it is lost, what goes along it stays.
+      const share = obstacle.room / left.length();
+      camera.position.addScaledVector(left, share);
+      left.multiplyScalar(1 - share);
+      left.addScaledVector(obstacle.normal, -left.dot(obstacle.normal));
     }
-    this.stand();
+    this.stand(step.length());
     this.stage.change();
   }
 
@@ -199,8 +202,9 @@ export class Navigator {
     return EYE * this.scale;
   }
 
-  /** The level normal of what a body would meet, if it meets anything: rays at the knee, the hip and the eyes. */
-  private obstacle(step: Vector3): Vector3 | null {
+  /** The level normal of what a body would meet on its way and how far it gets, if it meets anything: rays at the knee, the
+   *  hip and the eyes. Backs that are not seen are not in the way either: so one comes out of what one stands in. */
+  private obstacle(step: Vector3): { normal: Vector3; room: number } | null {
     const { position } = this.stage.camera;
     const direction = step.clone().normalize();
     const reach = step.length() + RADIUS * this.scale;
@@ -212,14 +216,15 @@ export class Navigator {
       for (const across of [0, -1, 1]) {
         const from = position.clone().addScaledVector(side, across);
         from.y -= below * height;
-        const hit = this.stage.cast(from, direction, reach, DoubleSide);
-        if (!hit || hit.distance < WITHIN * RADIUS * this.scale || (nearest && hit.distance >= nearest.distance)) continue;
+        const hit = this.stage.cast(from, direction, reach);
+        if (!hit || (nearest && hit.distance >= nearest.distance)) continue;
         const normal = new Vector3(hit.normal.x, 0, hit.normal.z);
         if (normal.lengthSq() < 1e-3) continue;
         nearest = { distance: hit.distance, normal: normal.normalize() };
       }
     }
-    return nearest && nearest.normal.dot(direction) < -1e-3 ? nearest.normal : null;
+    if (!nearest || nearest.normal.dot(direction) > -1e-3) return null;
+    return { normal: nearest.normal, room: Math.max(0, nearest.distance - RADIUS * this.scale) };
   }
 
   private floor(): number | null {
@@ -228,12 +233,14 @@ export class Navigator {
     return hit ? hit.point.y : null;
   }
 
-  /** Feet to the floor, if it is near enough to step on; where one flies above it, or there is none, nothing. */
-  private stand(): void {
+  /** Feet to the floor after a way, if it is near enough to step on; where one flies above it, or there is none, nothing. */
+  private stand(way: number): void {
     const { position } = this.stage.camera;
     const floor = this.floor();
     if (floor === null) return;
     const wanted = floor + this.height();
-    if (Math.abs(position.y - wanted) < STEP * this.height()) position.y += 0.35 * (wanted - position.y);
+    if (Math.abs(position.y - wanted) < STEP * this.height()) {
+      position.y += (1 - Math.exp(-way / (SETTLE * this.scale))) * (wanted - position.y);
+    }
   }
 }
