@@ -345,8 +345,6 @@ fn undo_restores_every_bit() {
     assert!(bits(&session)[..before.len()] == before[..]);
 }
 
-/// The first picture after an edit is near the light that follows: by less than a tenth of what paint changes, and by less
-/// than a quarter for a lamp that is moved, whose light has the noise of four shadow rays.
 /// The error that was told stayed that of the first light, whatever was dimmed.
 #[test]
 fn the_error_is_that_of_the_light_that_is_shown() {
@@ -377,6 +375,8 @@ fn the_error_is_that_of_the_light_that_is_shown() {
     assert!((0.5..2.0).contains(&(session.status().error / first)));
 }
 
+/// The first picture after an edit is near the light that follows: by less than a tenth of what paint changes, and by less
+/// than a quarter for a lamp that is moved, whose light has the noise of four shadow rays.
 #[test]
 fn the_first_picture_is_near_the_last() {
     let shift = glam::DMat4::from_translation(glam::DVec3::new(0.5, 0.0, 0.4)).to_cols_array();
