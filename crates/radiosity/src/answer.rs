@@ -124,6 +124,12 @@ impl Solution<'_> {
         })
     }
 
+    /// Irradiance of the elements that places lie on, lux per band; 0 in the open.
+    pub(crate) fn irradiance_at(&self, places: &[Place]) -> Vec<Bands> {
+        let at = |place| self.element_at(place).map_or([0.0; 3], |e| self.irradiance()[e as usize]);
+        places.iter().map(at).collect()
+    }
+
     /// The element that a place lies on; none in the open.
     pub(crate) fn element_at(&self, place: &Place) -> Option<ElementId> {
         let mesh = self.tracer().mesh;

@@ -129,7 +129,9 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut solution = Solution::new(tracer, &solve, monitor)?;
     let most_paths = most_paths(options.error);
     let watched: Vec<Station> = stations::spread(&solution, options.audit_points, options.seed as u32);
-    let mut auditor = Auditor::new(tracer, watched.iter().map(|s| s.place).collect(), options.seed);
+    let places: Vec<_> = watched.iter().map(|s| s.place).collect();
+    let expected = solution.irradiance_at(&places);
+    let mut auditor = Auditor::new(tracer, places, &expected, options.seed);
     let mut rounds = Vec::new();
     loop {
         // Elements that are only looked up make no field: a picture gathers for those that it shows.

@@ -182,7 +182,9 @@ pub fn measure(
     while !watched.is_empty() && watched.len() < LEAST_WATCHED {
         watched.extend_from_within(..);
     }
-    let mut auditor = Auditor::new(tracer, watched.iter().map(|&i| places[i]).collect(), options.seed);
+    let watched_places: Vec<Place> = watched.iter().map(|&i| places[i]).collect();
+    let expected = solution.irradiance_at(&watched_places);
+    let mut auditor = Auditor::new(tracer, watched_places, &expected, options.seed);
     // Few points can be looked at more closely for the same work.
     let closer = (options.audit_points / watched.len().max(1)).clamp(1, CLOSER) as u32;
     let most_paths = most_paths(options.error).saturating_mul(closer);

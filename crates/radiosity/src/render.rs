@@ -45,7 +45,7 @@ impl View {
     /// [`Error::Stopped`].
     pub fn audit(&self, baked: &Baked, monitor: &dyn Monitor) -> Result<Audit, Error> {
         let (places, light): (Vec<Place>, Vec<Bands>) = self.watched.iter().copied().unzip();
-        let mut auditor = Auditor::new(baked.solution.tracer(), places, u64::from(baked.seed));
+        let mut auditor = Auditor::new(baked.solution.tracer(), places, &light, u64::from(baked.seed));
         let judge = |auditor: &Auditor| auditor.judge(&light);
         certify(&mut auditor, judge, baked.error, most_paths(baked.error), &baked.stages, monitor)
     }

@@ -112,9 +112,10 @@ fn lamps_with_pictures_are_counted_once() {
         let (triangle, _) = elements.place(e);
         if scene.triangle_object[mesh.source[triangle] as usize] == 1 {
             dark.push(e as usize);
-            for k in 0..16 {
-                let (x, y) = (f64::from(k % 4) / 4.0 + 0.125, f64::from(k / 4) / 4.0 + 0.125);
-                let p = (uv(&mesh.point(triangle, elements.sample(e, x, y))) * SIZE as f32).as_ivec2();
+            let sampled: Vec<_> = elements.places(&scene, &mesh, e).collect();
+            for at in sampled {
+                let [a, b, c] = scene.corners(at.triangle);
+                let p = (uv(&(a + at.uv.x * (b - a) + at.uv.y * (c - a))) * SIZE as f32).as_ivec2();
                 for (x, y) in (-3..=3).flat_map(|y| (-3..=3).map(move |x| (p.x + x, p.y + y))) {
                     let clamp = |i: i32| i.clamp(0, SIZE as i32 - 1) as u32;
                     scene.textures[0].texels[(clamp(y) * SIZE + clamp(x)) as usize] = [0, 0, 0, 255];

@@ -231,8 +231,8 @@ impl Elements {
     }
 
     /// Mean reflectance and emitted exitance (π × luminance, lm/m² per band) of what of an element stops a ray: places
-    /// count by their opacity, since rays that look the element up have stopped there. Pictures are averaged over 16
-    /// points, plain materials take one.
+    /// count by their opacity, since rays that look the element up have stopped there. They are averaged over
+    /// [`Elements::places`].
     pub fn optics(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> (Bands, Bands) {
         let (mut reflectance, mut exitance, mut opaque) = ([0.0; 3], [0.0; 3], 0.0);
         self.sample_optics(scene, mesh, element, |at, share| {
@@ -283,22 +283,40 @@ impl Elements {
         opacity
     }
 
-    /// Calls back with places all over an element and the share of it that each stands for.
+    /// Calls back with [`Elements::places`] and the share of the element that each stands for.
     fn sample_optics(&self, scene: &Scene, mesh: &Mesh, element: ElementId, mut visit: impl FnMut(Surface, f32)) {
-        let (t, _) = self.place(element);
-        let material = scene.material(mesh.source[t] as usize);
-        let varied = material.base_color_texture.is_some()
-            || material.metallic_texture.is_some()
-            || material.emissive_texture.is_some()
-            || material.transmission.as_ref().is_some_and(|t| t.texture.is_some() || t.share_texture.is_some())
-            || !scene.colors.is_empty();
-        let n = if varied { 4 } else { 1 };
-        for i in 0..n * n {
-            let x = ((i % n) as f64 + 0.5) / n as f64;
-            let y = ((i / n) as f64 + 0.5) / n as f64;
-            visit(mesh.surface(t, self.sample(element, x, y)), 1.0 / (n * n) as f32);
-        }
+        let places = self.places(scene, mesh, element);
+        let share = 1.0 / places.len() as f32;
+        places.for_each(|at| visit(at, share));
     }
+
+    /// Places all over an element at which its optics are looked up: [`Scene::places_for_mean`], or one where nothing varies.
+    pub fn places(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> impl ExactSizeIterator<Item = Surface> {
+        let (t, _) = self.place(element);
+        let piece = self.corners(element);
+        let count = match scene.material(mesh.source[t] as usize).is_varied() || !scene.colors.is_empty() {
+            true => scene.places_for_mean(piece.map(|uv| mesh.surface(t, uv))),
+            false => 1,
+        };
+        places_over(piece, count, element).map(move |uv| mesh.surface(t, uv))
+    }
+}
+
+/// Barycentric coordinates of places all over a piece of a triangle: its middle, or the sequence of the plastic number (Roberts
+/// 2018, "The unreasonable effectiveness of quasirandom sequences"), begun where `seed` says. They lie on no grid: pictures
+/// of tiles are grids too, and one finds tiles of one colour on the other.
+pub fn places_over([a, b, c]: [DVec2; 3], count: u32, seed: u32) -> impl ExactSizeIterator<Item = DVec2> {
+    // 1/φ and 1/φ², φ³ = φ + 1.
+    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
+    (0..count).map(move |i| {
+        if count == 1 {
+            return (a + b + c) / 3.0;
+        }
+        // Far along the same sequence: pieces beside each other begin at places as different as those of one piece.
+        let k = f64::from(i) + 64.0 * f64::from(seed);
+        let (u, v) = triangle_from_square((k * STEP[0]).fract(), (k * STEP[1]).fract());
+        a + u * (b - a) + v * (c - a)
+    })
 }
 
 /// Maps the unit square to barycentric coordinates (weights of corners 1, 2), uniformly and without tearing
@@ -356,7 +374,8 @@ pub fn corners(piece: u32, k: u32) -> [DVec2; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Material;
+    use crate::{Material, Texture, TextureRef};
+    use glam::DAffine2;
 
     #[test]
     fn every_cell_contains_its_own_points_and_no_others() {
@@ -419,5 +438,28 @@ mod tests {
         assert_eq!(elements.normal(&mesh, back), -DVec3::Z);
         let total: f64 = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).sum();
         assert!((total - 1.0).abs() < 1e-12);
+    }
+
+    /// Squares of a picture that elements divide evenly: a grid of places found one colour in all elements.
+    #[test]
+    fn the_mean_of_tiles_is_that_of_both_colours() {
+        let texels = (0..64 * 64).map(|k| if (k % 64 + k / 64) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
+        let tiles = Texture { name: String::new(), width: 64, height: 64, texels: texels.collect() };
+        let wrap = [crate::Wrap::Repeat; 2];
+        let picture = TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap, nearest: true };
+        let material = Material { base_color_texture: Some(picture), ..Material::default() };
+        let mut scene = Scene { materials: vec![material], textures: vec![tiles], ..Scene::default() };
+        let corners = [[0., 0., 0.], [0., 0., 4.], [4., 0., 4.], [4., 0., 0.]].map(DVec3::from);
+        scene.add_quad("floor", 0, corners);
+        scene.uvs[0] = scene.positions.iter().map(|p| glam::Vec2::new(p.x as f32, p.z as f32) / 4.0).collect();
+        let mesh = Mesh::new(&scene);
+        for (size, most_off) in [(0.25, 0.3), (0.5, 0.25), (1.0, 0.15)] {
+            let elements = Elements::new(&scene, &mesh, size);
+            let means: Vec<f32> =
+                (0..elements.len() as u32).map(|e| elements.optics(&scene, &mesh, e).0[0] / 0.99).collect();
+            let mean = means.iter().sum::<f32>() / means.len() as f32;
+            let off = means.iter().fold(0f32, |most, m| most.max((m - 0.5).abs()));
+            assert!((mean - 0.5).abs() < 0.01 && off < most_off, "{size}: {mean}, {off}");
+        }
     }
 }

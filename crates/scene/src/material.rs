@@ -114,6 +114,17 @@ impl Material {
         self.emissive.iter().any(|&e| e > 0.0)
     }
 
+    /// Pictures that vary what the surface is like.
+    pub fn pictures(&self) -> impl Iterator<Item = &TextureRef> {
+        let sheet = self.transmission.iter().flat_map(|t| t.texture.iter().chain(&t.share_texture));
+        self.base_color_texture.iter().chain(&self.metallic_texture).chain(&self.emissive_texture).chain(sheet)
+    }
+
+    /// Whether a picture varies what the surface is like.
+    pub fn is_varied(&self) -> bool {
+        self.pictures().next().is_some()
+    }
+
     /// Whether light passes through the surface anywhere.
     pub fn transmits(&self) -> bool {
         self.transmission.as_ref().is_some_and(|t| t.transmittance.iter().any(|&tau| tau > 0.0))

@@ -21,6 +21,9 @@ const ONE_SIDED_95: f64 = 1.645;
 /// Standard errors beyond which an answer is wrong for certain.
 const CERTAIN: f64 = 3.0;
 
+/// Most and fewest paths of a place, relative to `paths`, as powers of two: no single place is to take all the time.
+const DOUBLINGS: [i32; 2] = [-2, 4];
+
 /// Fewer points than this get no bound: the spread of heavy-tailed products cannot be told from a handful.
 pub const FEWEST_POINTS: usize = 30;
 
@@ -29,7 +32,7 @@ pub const FEWEST_POINTS: usize = 30;
 pub struct Audit {
     /// Points examined.
     pub points: usize,
-    /// Paths per estimate, two estimates per point.
+    /// Paths per estimate where light is as bright as on average; two estimates per point.
     pub paths: u32,
     /// Estimated relative L2 error of irradiance (luminance-weighted): ‖h − E‖/‖E‖. An estimate below zero, which
     /// noise can produce, is given as zero.
@@ -64,17 +67,31 @@ impl Audit {
 pub struct Auditor<'a> {
     referee: Referee<'a>,
     places: Vec<Place>,
-    /// Sums of the two independent estimates of illuminance at each place.
-    sums: Vec<[f64; 2]>,
+    /// By how many powers of two more paths than `paths` go to each place.
+    doublings: Vec<i32>,
+    /// The two independent estimates of illuminance at each place, lx.
+    estimates: Vec<[f64; 2]>,
     paths: u32,
     seed: u64,
 }
 
 impl<'a> Auditor<'a> {
-    /// An auditor of places that are spread evenly by area. Different seeds are independent.
-    pub fn new(tracer: &'a Tracer<'a>, places: Vec<Place>, seed: u64) -> Auditor<'a> {
-        let sums = vec![[0.0; 2]; places.len()];
-        Auditor { referee: Referee::new(tracer), places, sums, paths: 0, seed }
+    /// An auditor of places that are spread evenly by area. `light` is the irradiance expected at each, 0 where nothing is known.
+    /// Bright places get more paths: the variance of (h − a)(h − b) is about σ⁴/n², σ being the noise of one of n paths, and is
+    /// least, over all places, with n ∝ σ^(4/3); and σ is about in proportion to light. Whatever is expected, estimates are
+    /// unbiased. Different seeds are independent.
+    pub fn new(tracer: &'a Tracer<'a>, places: Vec<Place>, light: &[Bands], seed: u64) -> Auditor<'a> {
+        assert_eq!(places.len(), light.len());
+        let light: Vec<f64> = light.iter().map(|&e| f64::from(luminance(e))).collect();
+        let mean = light.iter().sum::<f64>() / light.len().max(1) as f64;
+        let [least, most] = DOUBLINGS.map(f64::from);
+        let doublings = |e: &f64| match *e > 0.0 {
+            true => (4.0 / 3.0 * (e / mean).log2()).round().clamp(least, most) as i32,
+            false => 0,
+        };
+        let estimates = vec![[0.0; 2]; places.len()];
+        let doublings = light.iter().map(doublings).collect();
+        Auditor { referee: Referee::new(tracer), places, doublings, estimates, paths: 0, seed }
     }
 
     /// The places, in the order in which answers are expected.
@@ -87,37 +104,41 @@ impl<'a> Auditor<'a> {
         self.paths
     }
 
-    /// Traces until each estimate has `paths` paths. `step` is told how many places are done and may end it, which
-    /// leaves the estimates as they were.
+    /// Traces until each estimate has `paths` paths, or as many times more or less as its place gets. `step` is told how many
+    /// places are done and may end it, which leaves the estimates as they were.
     pub fn trace(&mut self, paths: u32, step: impl Fn(usize) -> bool + Sync) -> bool {
-        let more = paths.saturating_sub(self.paths);
-        if more == 0 {
+        if paths <= self.paths {
             return true;
         }
         let done = std::sync::atomic::AtomicUsize::new(0);
-        let (referee, places, first) = (&self.referee, &self.places, self.paths);
-        let seed = self.seed;
-        let added: Option<Vec<[f64; 2]>> = (0..places.len())
+        let (this, first, seed) = (&*self, self.paths, self.seed);
+        let refined: Option<Vec<[f64; 2]>> = (0..this.places.len())
             .into_par_iter()
             .map(|i| {
+                let [had, has] = [first, paths].map(|paths| this.paths_at(i, paths));
                 let pair = std::array::from_fn(|half| {
                     let seed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
                         ^ (i as u64) << 32
                         ^ u64::from(first) << 1
                         ^ half as u64;
-                    f64::from(luminance(referee.irradiance(&places[i], more, seed))) * f64::from(more)
+                    let added = f64::from(luminance(this.referee.irradiance(&this.places[i], has - had, seed)));
+                    let share = f64::from(had) / f64::from(has);
+                    share * this.estimates[i][half] + (1.0 - share) * added
                 });
                 let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                 step(so_far).then_some(pair)
             })
             .collect();
-        let Some(added) = added else { return false };
-        for (sum, added) in self.sums.iter_mut().zip(added) {
-            sum[0] += added[0];
-            sum[1] += added[1];
-        }
-        self.paths += more;
+        let Some(refined) = refined else { return false };
+        self.estimates = refined;
+        self.paths = paths;
         true
+    }
+
+    /// Paths of each estimate at a place when those of an average one has `paths`: none, or at least one.
+    fn paths_at(&self, place: usize, paths: u32) -> u32 {
+        let wanted = f64::from(paths) * 2f64.powi(self.doublings[place]);
+        wanted.ceil().min(f64::from(u32::MAX)) as u32
     }
 
     /// Judges an answer `h`: lux per band at each place.
@@ -126,7 +147,7 @@ impl<'a> Auditor<'a> {
         if self.paths == 0 || h.is_empty() {
             return Audit { upper: f64::INFINITY, ..Audit::default() };
         }
-        judge(&self.sums, h, None, self.paths)
+        judge(&self.estimates, h, None, self.paths)
     }
 
     /// Judges light `read` from an answer `h` and handed out, both at each place, by what it differs from that answer at
@@ -136,19 +157,19 @@ impl<'a> Auditor<'a> {
         if self.paths == 0 || h.is_empty() || squares.len() < FEWEST_POINTS {
             return self.judge(read);
         }
-        judge(&self.sums, read, Some((h, squares)), self.paths)
+        judge(&self.estimates, read, Some((h, squares)), self.paths)
     }
 }
 
-fn judge(sums: &[[f64; 2]], m: &[Bands], from: Option<(&[Bands], &[f64])>, paths: u32) -> Audit {
-    let n = sums.len() as f64;
-    let paths_each = f64::from(paths);
+fn judge(estimates: &[[f64; 2]], m: &[Bands], from: Option<(&[Bands], &[f64])>, paths: u32) -> Audit {
+    let n = estimates.len() as f64;
     // Both estimates, the light judged, and what it was read from.
-    let places: Vec<[f64; 4]> = (0..sums.len())
+    let places: Vec<[f64; 4]> = (0..estimates.len())
         .map(|i| {
             let m_i = f64::from(luminance(m[i]));
             let h_i = from.map_or(m_i, |(h, _)| f64::from(luminance(h[i])));
-            [sums[i][0] / paths_each, sums[i][1] / paths_each, m_i, h_i]
+            let [a, b] = estimates[i];
+            [a, b, m_i, h_i]
         })
         .collect();
     let mean = |f: &dyn Fn(&[f64; 4]) -> f64| places.iter().map(f).sum::<f64>() / n.max(1.0);
@@ -167,24 +188,24 @@ fn judge(sums: &[[f64; 2]], m: &[Bands], from: Option<(&[Bands], &[f64])>, paths
     let level = mean(&|[a, b, ..]| 0.5 * (a + b));
     let shift = |[a, b, m, _]: &[f64; 4]| m - 0.5 * (a + b);
     let bias = mean(&shift);
-    if sums.iter().all(|[a, b]| *a == 0.0 && *b == 0.0) {
+    if estimates.iter().all(|[a, b]| *a == 0.0 && *b == 0.0) {
         // Where the referee finds no light at all, no light is right and any other answer infinitely wrong.
         let is_dark = places.iter().all(|[_, _, m, _]| *m == 0.0);
         let error = if is_dark { 0.0 } else { f64::INFINITY };
-        return Audit { points: sums.len(), paths, error, upper: error, ..Audit::default() };
+        return Audit { points: estimates.len(), paths, error, upper: error, ..Audit::default() };
     }
     let root = |x: f64| (x.max(0.0) / square).sqrt();
     Audit {
-        points: sums.len(),
+        points: estimates.len(),
         paths,
         error: root(squared_error),
         // A handful of products says nothing of their spread: no bound is better than a false one.
-        upper: if sums.len() < FEWEST_POINTS {
+        upper: if estimates.len() < FEWEST_POINTS {
             f64::INFINITY
         } else {
             root(squared_error.max(0.0) + ONE_SIDED_95 * noise)
         },
-        lower: if sums.len() < FEWEST_POINTS { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise) },
+        lower: if estimates.len() < FEWEST_POINTS { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise) },
         bias: bias / level.max(f64::MIN_POSITIVE),
         bias_error: deviation(&shift, bias) / level.max(f64::MIN_POSITIVE),
         mean_illuminance: level,
@@ -195,17 +216,51 @@ fn judge(sums: &[[f64; 2]], m: &[Bands], from: Option<(&[Bands], &[f64])>, paths
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
+    use radiosity_scene::{Material, Mesh, Scene};
 
     /// A few bright paths of the referee are no proof that an answer is wrong; that all places say so is.
     #[test]
     fn few_bright_paths_prove_no_error() {
         let audit = |h: f32, bright: usize| {
-            let sums: Vec<[f64; 2]> = (0..500).map(|i| if i < bright { [1.6, 1.6] } else { [1.0, 1.0] }).collect();
-            judge(&sums, &vec![[h; 3]; 500], None, 1)
+            let estimates: Vec<[f64; 2]> = (0..500).map(|i| if i < bright { [1.6, 1.6] } else { [1.0, 1.0] }).collect();
+            judge(&estimates, &vec![[h; 3]; 500], None, 1)
         };
         let lucky = audit(1.0, 2);
         assert!(lucky.error > 0.03 && !lucky.is_above(0.01), "{lucky:?}");
         let wrong = audit(1.03, 0);
         assert!((wrong.error - 0.03).abs() < 1e-6 && wrong.is_above(0.01), "{wrong:?}");
+    }
+
+    /// Bright places get more paths and dark ones fewer; whatever is expected, estimates have the same mean.
+    #[test]
+    fn what_is_expected_moves_paths_and_no_estimate() {
+        let lamp = Material { emissive: [100.0; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
+        let mut scene = Scene { materials: vec![Material::default(), lamp], ..Scene::default() };
+        let square = |half: f64, y: f64| {
+            [[-1., -1.], [-1., 1.], [1., 1.], [1., -1.]].map(|[x, z]| DVec3::new(half * x, y, half * z))
+        };
+        scene.add_quad("floor", 0, square(3.0, 0.0));
+        let [a, b, c, d] = square(0.5, 1.0);
+        scene.add_quad("lamp", 1, [d, c, b, a]);
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let at = |k: u32| {
+            let point = DVec3::new(0.05 * f64::from(k), 0.0, 0.1);
+            Place { point, normal: DVec3::Y, triangle: u32::MAX }
+        };
+        let places: Vec<Place> = (0..40).map(at).collect();
+        let light: Vec<Bands> = (0..40).map(|k| [if k < 10 { 100.0 } else { 5.0 }; 3]).collect();
+        let mut reversed = light.clone();
+        reversed.reverse();
+        let levels = [light, reversed].map(|light| {
+            let mut auditor = Auditor::new(&tracer, places.clone(), &light, 3);
+            let paths = |a: &Auditor, k: usize| a.paths_at(k, 256);
+            let (bright, dark) = if light[0][0] > 50.0 { (0, 39) } else { (39, 0) };
+            assert_eq!((paths(&auditor, bright), paths(&auditor, dark)), (256 << 2, 256 >> 2));
+            assert!(auditor.trace(64, |_| true) && auditor.trace(4096, |_| true));
+            auditor.judge(&vec![[1.0; 3]; 40]).mean_illuminance
+        });
+        assert!((levels[0] / levels[1] - 1.0).abs() < 0.005, "{levels:?}");
     }
 }

@@ -71,7 +71,7 @@ pub(super) fn truth<'a>(
     let engine = solution.at(&places, Indirect::Field(&field), &SHADOWING, monitor)?.irradiance;
     monitor.stage("referee");
     let at: Vec<Place> = places.iter().map(|station| station.place).collect();
-    let mut auditor = Auditor::new(tracer, at, seed);
+    let mut auditor = Auditor::new(tracer, at, &engine, seed);
     if !auditor.trace(paths, |done| monitor.step(done, places.len())) {
         return Err(Error::Stopped);
     }

@@ -1,14 +1,10 @@
 //! Reflectance and transmittance of an object's elements, as the file has them and as they are painted.
 
-use glam::DVec2;
 use radiosity_scene::display::srgb;
-use radiosity_scene::elements::triangle_from_square;
+use radiosity_scene::elements::places_over;
 use radiosity_scene::material::MAX_REFLECTANCE;
 use radiosity_scene::{Bands, Scene, Surface, Texture};
 use radiosity_transport::live::Shape;
-
-/// Places along a side of the grid that pictures are averaged over.
-const GRID: usize = 4;
 
 /// What a shape is like in the file.
 #[derive(Clone, Debug, Default)]
@@ -28,10 +24,7 @@ impl Paint {
     /// The paint of an object.
     pub fn new(scene: &Scene, object: usize, shape: &Shape) -> Paint {
         let material = &scene.materials[scene.objects[object].material];
-        let is_varied = material.base_color_texture.is_some()
-            || material.metallic_texture.is_some()
-            || material.transmission.as_ref().is_some_and(|t| t.texture.is_some() || t.share_texture.is_some())
-            || !scene.colors.is_empty();
+        let is_varied = material.is_varied() || !scene.colors.is_empty();
         let transmits = material.transmits();
         let (mut rho, mut tau) = (Vec::new(), Vec::new());
         let (mut sum, mut whole) = ([0f64; 3], 0f64);
@@ -39,7 +32,7 @@ impl Paint {
             let (t, _, _) = shape.place(element);
             let triangle = shape.triangles.start + t;
             if is_varied || element == 0 {
-                let (r, t) = mean_optics(scene, shape, element, if is_varied { GRID } else { 1 });
+                let (r, t) = mean_optics(scene, shape, element, is_varied);
                 rho.push(r);
                 tau.push(t);
             }
@@ -93,14 +86,12 @@ pub fn brighter(texture: &Texture, factor: Bands) -> Texture {
     Texture { texels: texture.texels.iter().map(texel).collect(), ..texture.clone() }
 }
 
-fn mean_optics(scene: &Scene, shape: &Shape, element: u32, n: usize) -> (Bands, Bands) {
-    let (t, _, [a, b, c]) = shape.place(element);
+fn mean_optics(scene: &Scene, shape: &Shape, element: u32, is_varied: bool) -> (Bands, Bands) {
+    let (t, _, piece) = shape.place(element);
     let triangle = shape.triangles.start + t;
     let (mut rho, mut tau, mut opaque) = ([0f32; 3], [0f32; 3], 0f32);
-    for i in 0..n * n {
-        let (x, y) = (((i % n) as f64 + 0.5) / n as f64, ((i / n) as f64 + 0.5) / n as f64);
-        let (u, v) = triangle_from_square(x, y);
-        let uv: DVec2 = a + u * (b - a) + v * (c - a);
+    let count = if is_varied { scene.places_for_mean(piece.map(|uv| Surface { triangle, uv })) } else { 1 };
+    for uv in places_over(piece, count, element) {
         let at = Surface { triangle, uv };
         let weight = scene.opacity(at);
         if weight > 0.0 {

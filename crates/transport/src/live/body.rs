@@ -4,7 +4,7 @@
 //! place has the same bits there.
 
 use glam::{DAffine3, DVec2, DVec3};
-use radiosity_scene::elements::{corners, division_of, locate, triangle_from_square};
+use radiosity_scene::elements::{corners, division_of, locate, places_over, triangle_from_square};
 use radiosity_scene::{AlphaMode, Bands, Scene, Side, Surface};
 use radiosity_trace::{Place, Tree};
 use std::ops::Range;
@@ -38,8 +38,8 @@ pub struct Shape {
     triangle_of: Vec<u32>,
 }
 
-/// Places along a side of the grid that emission is averaged over, where it is a picture.
-const GRID: usize = 8;
+/// Places that emission is averaged over, where it is a picture.
+const PLACES: u32 = 64;
 
 impl Shape {
     /// An object of a scene, cut into elements about `size` wide.
@@ -60,13 +60,11 @@ impl Shape {
         let is_varied = material.emissive_texture.is_some()
             || is_see_through && (material.base_color_texture.is_some() || !scene.colors.is_empty());
         let exitance = |triangle: usize| -> Bands {
-            let n = if is_varied { GRID } else { 1 };
+            let count = if is_varied { PLACES } else { 1 };
             let mut sum = [0.0; 3];
-            for i in 0..n * n {
-                let [x, y] = [i % n, i / n].map(|k| (k as f64 + 0.5) / n as f64);
-                let (u, v) = triangle_from_square(x, y);
-                let given = given_at(scene, Surface { triangle, uv: DVec2::new(u, v) });
-                (0..3).for_each(|band| sum[band] += given[band] / (n * n) as f32);
+            for uv in places_over([DVec2::ZERO, DVec2::X, DVec2::Y], count, triangle as u32) {
+                let given = given_at(scene, Surface { triangle, uv });
+                (0..3).for_each(|band| sum[band] += given[band] / count as f32);
             }
             sum
         };
