@@ -8,6 +8,7 @@ import { beside, lampAhead, type Lamp, type LampKind } from './lamps';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
 import { BORDER, HEIGHT, PlaneAsker, type WorkingPlane } from './plane';
+import { Sight } from './sight';
 import { corners, Stage, type Hit } from './stage';
 import { Mode, shared, Surface } from './surface';
 import {
@@ -17,7 +18,7 @@ import {
 
 /** What can change. */
 export type Topic =
-  | 'scene' | 'objects' | 'lights' | 'status' | 'bookmarks' | 'history' | 'selection' | 'probe' | 'grid' | 'view' | 'connection' | 'message';
+  | 'scene' | 'objects' | 'lights' | 'status' | 'bookmarks' | 'history' | 'selection' | 'probe' | 'sight' | 'grid' | 'view' | 'connection' | 'message';
 
 /** Milliseconds between edits of one gesture: more often than light can follow is of no use. */
 const GESTURE = 40;
@@ -39,6 +40,7 @@ export class App {
   readonly exposure = new Exposure(this.stage, () => this.tell('view'));
   readonly marks = new Marks(this.stage);
   readonly gizmo = new Gizmo(this);
+  readonly sight = new Sight(this);
   readonly connection: Connection;
   scene: SceneNotice | null = null;
   /** Objects and lights as they are shown: what the server said, and what is changed here. */
@@ -188,6 +190,9 @@ export class App {
         break;
       case 'plane':
         if (this.planes.hear(notice.question)) this.tellPlane(notice.answer, notice.why);
+        break;
+      case 'in_sight':
+        this.sight.hear(notice.question, notice.error);
         break;
       case 'rays':
         if (notice.question === this.question) this.marks.rays(notice.rays);
@@ -713,7 +718,7 @@ export class App {
   }
 
   private paintMode(): void {
-    shared.mode.value = this.falseColours || this.layer === 'error' ? Mode.Lux : Mode.Eye;
+    shared.mode.value = this.falseColours || isError(this.layer) ? Mode.Lux : Mode.Eye;
     this.exposure.meter();
     this.tell('view');
     this.stage.change();
@@ -820,6 +825,11 @@ export class App {
     this.navigator.set(mode);
     this.tell('view');
   }
+}
+
+/** Whether a layer shows no light, but how far it is known. */
+export function isError(layer: Layer): boolean {
+  return layer === 'error' || layer === 'relative_error';
 }
 
 /** Whether a light is a lamp without area, which can be placed by itself. */

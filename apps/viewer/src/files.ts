@@ -11,9 +11,10 @@ export function savePoints(app: App): void {
   const up = normal?.toArray() ?? [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
   const row = ({ point, lux }: ReturnType<typeof measured>[number]) =>
     [...stage.toScene(point).toArray().map((x) => x.toFixed(5)), ...up.map((x) => x.toFixed(6)), lux.toPrecision(6)].join(',');
-  const rows = ['x,y,z,nx,ny,nz,illuminance_lux', ...measured(app).map(row), ''];
+  const column = grid && app.layer === 'relative_error' ? 'relative_error_percent' : 'illuminance_lux';
+  const rows = [`x,y,z,nx,ny,nz,${column}`, ...measured(app).map(row), ''];
   save(app, new Blob([rows.join('\n')], { type: 'text/csv' }), plane ? 'plane.csv' : 'grid.csv');
-  app.say('Points saved: place, normal, illuminance.');
+  app.say(`Points saved: place, normal, ${column}.`);
 }
 
 /** Hands a file to the person, named after the scene. */

@@ -1,9 +1,9 @@
 // The scale of false colours, and the numbers of a grid, over the picture.
 import { Vector3 } from 'three';
-import type { App } from './app';
+import { isError, type App } from './app';
 import { places } from './isolines';
 import { el } from './panels/parts';
-import { layerName } from './panels/view';
+import { layerName, unitOf } from './panels/view';
 import { measured } from './plane';
 import { PALETTE, readable } from './scale';
 import { shared } from './surface';
@@ -12,11 +12,12 @@ export function legend(app: App): HTMLElement {
   const colours = PALETTE.map((c, i) => `rgb(${c.map((x) => Math.round(255 * x)).join(' ')}) ${(100 * i) / (PALETTE.length - 1)}%`);
   const bar = el('i', { style: `background:linear-gradient(to top, ${colours.join(', ')})` });
   const marks = el('div', { class: 'ticks' });
-  const unit = el('span', { class: 'unit' }, 'lx');
-  const element = el('aside', { class: 'legend', id: 'legend', 'aria-label': 'Scale of illuminance' }, unit, el('div', { class: 'scale' }, bar, marks));
+  const unit = el('span', { class: 'unit' });
+  const element = el('aside', { class: 'legend', id: 'legend', 'aria-label': 'Scale of the colours' }, unit, el('div', { class: 'scale' }, bar, marks));
   app.on('view', () => {
     element.hidden = !isScaled(app);
     bar.hidden = !isColoured(app);
+    unit.textContent = unitOf(app.layer);
     app.marks.colourPlane();
     marks.replaceChildren(...app.exposure.levels.map((level) => el('span', { style: `bottom:${100 * share(app, level)}%` }, readable(level))));
   });
@@ -24,7 +25,7 @@ export function legend(app: App): HTMLElement {
 }
 
 /** Whether colours stand for numbers, and whether colours or lines do. */
-const isColoured = (app: App): boolean => app.falseColours || app.layer === 'error' || Boolean(app.plane?.answer);
+const isColoured = (app: App): boolean => app.falseColours || isError(app.layer) || Boolean(app.plane?.answer);
 const isScaled = (app: App): boolean => isColoured(app) || shared.isolines.value;
 
 /** Where a value is on the scale, 0..1. */
@@ -52,7 +53,7 @@ export function drawOver(app: App, pen: CanvasRenderingContext2D): void {
 /** The scale at the lower left of a picture, as the page has it; `tall` is the picture, CSS pixels. */
 function drawScale(app: App, pen: CanvasRenderingContext2D, tall: number): void {
   pen.font = '12px system-ui, sans-serif';
-  const title = `${layerName(app, app.layer)}, lx`;
+  const title = isError(app.layer) ? layerName(app, app.layer) : `${layerName(app, app.layer)}, lx`;
   const height = Math.min(0.38 * tall, 260);
   const [left, top] = [26, tall - 28 - height];
   pen.fillStyle = '#101214d0';

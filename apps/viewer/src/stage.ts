@@ -311,6 +311,11 @@ export class Stage {
     this.change();
   }
 
+  /** The vertical angle of view that is drawn, radians. */
+  get angle(): number {
+    return (this.camera.fov * Math.PI) / 180;
+  }
+
   /** Where one looks from now. */
   place(name: string): CameraPlace {
     this.camera.updateMatrixWorld();

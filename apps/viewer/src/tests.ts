@@ -106,6 +106,7 @@ export function tests(app: App) {
       layer: app.layer,
       probe: app.probed?.answer ?? null,
       exposure: app.exposure.value,
+      inSight: app.sight.error,
     }),
     /** Frames a second while the camera turns without pause. */
     frameRate: (seconds: number) => new Promise<number>((done) => {

@@ -77,7 +77,7 @@ export interface StatusNotice {
   is_following: boolean;
   rays: number;
   most_rays: number;
-  /** Relative error of irradiance, estimated; none before there is one. */
+  /** Relative error of irradiance, estimated over all surfaces; none before there is one. */
   error: number | null;
   seconds: number;
   /** Seconds to the target, about. */
@@ -150,11 +150,12 @@ export type Notice =
   | { kind: 'caught_up' }
   | { kind: 'probe'; question: number; answer: ProbeAnswer | null }
   | { kind: 'plane'; question: number; answer: PlaneAnswer | null; why: string | null }
+  | { kind: 'in_sight'; question: number; error: number | null }
   | { kind: 'rays'; question: number; rays: number[][][] }
   | RefusedNotice;
 
 /** What a layer shows. */
-export type Layer = 'total' | 'direct' | 'indirect' | 'error' | { bounce: number } | { light: number };
+export type Layer = 'total' | 'direct' | 'indirect' | 'error' | 'relative_error' | { bounce: number } | { light: number };
 
 /** Kinds of lights without area. */
 export type LampForm = 'point' | 'directional' | { spot: { inner: number; outer: number } };
@@ -191,6 +192,7 @@ export type Request =
   | { kind: 'layer'; layer: Layer; epoch: number }
   | { kind: 'probe'; question: number; object: number; triangle: number; uv: [number, number] }
   | { kind: 'plane'; question: number; about: { object: number; triangle: number; uv: [number, number]; height: number; border: number } }
+  | { kind: 'in_sight'; question: number; matrix: number[]; fov: number; aspect: number }
   | { kind: 'rays'; question: number; object: number; triangle: number }
   | { kind: 'bookmark'; camera: CameraPlace }
   | { kind: 'forget'; name: string };

@@ -416,6 +416,48 @@ test('layers add up, and models are saved', async () => {
   await page.context().close();
 });
 
+test('the error of what is in sight is told, and that of each place in percent of its light', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const told = async () => {
+    await page.waitForFunction(() => window.radiosity.state().inSight !== null);
+    // It is asked for where the camera rests.
+    await page.waitForTimeout(1000);
+    return (await state(page)).inSight;
+  };
+  const all = await told();
+  assert.match(await page.locator('#in-sight').textContent(), /^in sight ± [0-9.]+ %$/);
+  // From near a wall, nothing but that wall.
+  const near = async (from, way) => {
+    await page.evaluate(([from, way]) => {
+      const { stage } = window.radiosity.app;
+      stage.camera.position.set(...from);
+      stage.camera.lookAt(...from.map((x, k) => x + way[k]));
+      stage.change();
+    }, [from, way]);
+    return told();
+  };
+  const seen = await near([0.28, 0.15, 0.45], [0.02, 0, 1]);
+  assert.notEqual(seen, all);
+  await page.evaluate(() => window.radiosity.app.showLayer('relative_error'));
+  await done(page);
+  const map = await page.evaluate(() => {
+    const { app, lux } = window.radiosity;
+    const found = [];
+    for (let i = 0; i < 400; i += 1) {
+      const hit = app.stage.pick(-1 + (2 * (i % 20) + 1) / 20, -1 + (2 * Math.floor(i / 20) + 1) / 20);
+      if (hit) found.push(lux([...app.stage.toScene(hit.point).toArray(), ...app.stage.toScene(hit.normal).toArray()]));
+    }
+    return found.reduce((sum, x) => sum + x, 0) / found.length;
+  });
+  // On the map each element has the mean of those around it, and those at the border others.
+  assert.ok(Math.abs(map / (100 * seen) - 1) < 0.15, `${map} on the map, ${100 * seen} told`);
+  assert.equal(await page.locator('#legend .unit').textContent(), '%');
+  await picture(page, 'error');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('through the walls of a closed room nothing is seen, whichever way one looks', async () => {
   await folder(async (path) => {
     writeFileSync(join(path, 'room.obj'), room());

@@ -252,6 +252,10 @@ impl Solver {
                 let probe = self.session.probe(*object, *triangle, *uv).filter(|_| is_place);
                 Some(Say::Probe { question: *question, answer: probe.map(|probe| self.read(&probe)) }.text())
             }
+            Request::InSight { question, matrix, fov, aspect } => {
+                let error = self.session.error_in_sight(matrix, *fov, *aspect);
+                Some(Say::InSight { question: *question, error }.text())
+            }
             Request::Rays { question, object, triangle } => {
                 Some(Say::Rays { question: *question, rays: self.session.rays(*object, *triangle) }.text())
             }

@@ -69,6 +69,16 @@ pub enum Request {
         question: u64,
         about: PlaneQuestion,
     },
+    /// Asks how far the light is known that is seen from a place.
+    InSight {
+        question: u64,
+        /// World from camera, by columns.
+        matrix: [f64; 16],
+        /// Vertical angle of view, radians.
+        fov: f64,
+        /// Width over height.
+        aspect: f64,
+    },
     /// Asks for the rays of an element.
     Rays {
         question: u64,
@@ -147,6 +157,11 @@ pub enum Say<'a> {
         /// None if there is no such plane; then why not.
         answer: Option<PlaneAnswer>,
         why: Option<String>,
+    },
+    InSight {
+        question: u64,
+        /// Mean relative error of the light in sight; none while it is not known.
+        error: Option<f64>,
     },
     Rays {
         question: u64,

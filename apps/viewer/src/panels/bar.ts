@@ -7,7 +7,8 @@ import { button, choice, el } from './parts';
 export function bar(app: App, { help, fold }: { help(): void; fold(): void }): HTMLElement {
   const title = el('b', { class: 'scene' });
   const progress = el('i', { class: 'progress', role: 'progressbar', 'aria-label': 'Solution', 'aria-valuemin': 0, 'aria-valuemax': 100 });
-  const error = el('span', { id: 'error', title: 'Estimated relative error of illuminance, over all surfaces' });
+  const sight = el('span', { id: 'in-sight', title: 'Estimated error of the illuminance in sight: one standard error over the light there, in the mean over the picture' });
+  const error = el('span', { class: 'wide', id: 'error', title: 'Estimated relative error of all light together (L2): that of the brightest surfaces' });
   const rays = el('span', { class: 'wide', id: 'rays' });
   const left = el('span', { class: 'wide', id: 'left' });
   const mode = choice('How to move', [['walk', 'Walk', 'V'], ['orbit', 'Orbit', 'V']], (value) => app.walk(value));
@@ -66,6 +67,9 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     undo.title = app.undoable ? `Undo: ${app.undoable} (Ctrl+Z)` : 'Nothing to undo';
     redo.title = app.redoable ? `Redo: ${app.redoable} (Ctrl+Y)` : 'Nothing to redo';
   });
+  app.on('sight', () => {
+    sight.textContent = app.sight.error === null ? '' : `in sight ± ${percent(app.sight.error)}`;
+  });
   app.on('status', () => {
     const { status } = app;
     if (!status) return;
@@ -76,15 +80,15 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     progress.classList.toggle('done', status.is_done);
     rays.textContent = `${status.rays} of ${status.most_rays} rays`;
     // After a change it is known again when all rays are there; the bar does not jump meanwhile.
-    const unknown = status.edits > 0 ? '± …' : 'error not known yet';
-    error.textContent = status.error === null ? unknown : `± ${percent(status.error)}`;
+    const unknown = status.edits > 0 ? 'in all ± …' : 'error not known yet';
+    error.textContent = status.error === null ? unknown : `in all ± ${percent(status.error)}`;
     left.textContent = status.is_done ? `done in ${duration(status.seconds)}` : status.left === null ? '' : `${duration(status.left)} left`;
   });
   return el('header', {},
     el('div', { class: 'track' }, progress),
     el('span', { class: 'brand', 'aria-hidden': 'true' }),
     title,
-    el('span', { class: 'figures' }, error, rays, left),
+    el('span', { class: 'figures' }, sight, error, rays, left),
     el('span', { class: 'grow' }),
     mode, undo, redo, el('span', { class: 'anchor' }, save, menu),
     button('?', help, { key: 'H', title: 'Keys', kind: 'icon' }),

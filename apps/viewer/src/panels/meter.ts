@@ -6,7 +6,7 @@ import { lateness } from '../plane';
 import { readable } from '../scale';
 import type { Share } from '../wire';
 import { button, el, fact, hex, isOpen, section } from './parts';
-import { layerName } from './view';
+import { layerName, unitOf } from './view';
 
 export function meterPanel(app: App): HTMLElement {
   const none = el('p', { class: 'quiet' }, 'Click a surface, or press Enter for what is under the cross.');
@@ -75,11 +75,12 @@ export function gridPanel(app: App): HTMLElement {
     const told = grid ?? (answer && { ...answer, largest: answer.most, isCoarse: answer.is_coarse });
     csv.hidden = facts.hidden = !told;
     if (!told) return;
+    const unit = grid ? unitOf(app.layer) : 'lx';
     const { least, mean, largest, uniformity, points, cell, size, isCoarse } = told;
     facts.replaceChildren(
-      fact('Mean', `${readable(mean)} lx`),
-      fact('Least', `${readable(least)} lx`),
-      fact('Most', `${readable(largest)} lx`),
+      fact('Mean', `${readable(mean)} ${unit}`),
+      fact('Least', `${readable(least)} ${unit}`),
+      fact('Most', `${readable(largest)} ${unit}`),
       fact('Uniformity', uniformity.toFixed(2)),
       fact('Points', String(points.length)),
       ...(answer ? [fact('Noise of a point', `± ${(100 * answer.error).toPrecision(2)} %`)] : []),

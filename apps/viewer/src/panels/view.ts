@@ -1,5 +1,5 @@
 // How the light is shown: exposure, false colours, layers.
-import type { App } from '../app';
+import { isError, type App } from '../app';
 import { shared } from '../surface';
 import type { Layer } from '../wire';
 import { button, choice, el, isOpen, section, slider, toggle } from './parts';
@@ -9,10 +9,16 @@ export function layerName(app: App, layer: Layer): string {
   if (layer === 'total') return 'All light';
   if (layer === 'direct') return 'Direct light';
   if (layer === 'indirect') return 'Indirect light';
-  if (layer === 'error') return 'Estimated error';
+  if (layer === 'error') return 'Error, lx';
+  if (layer === 'relative_error') return 'Error, % of the light there';
   if ('bounce' in layer) return layer.bounce === 1 ? 'First bounce' : `Bounce ${layer.bounce}`;
   const light = app.lights.get(layer.light);
   return light ? app.lightName(light) : `Light ${layer.light + 1}`;
+}
+
+/** In what a layer is told. */
+export function unitOf(layer: Layer): string {
+  return layer === 'relative_error' ? '%' : 'lx';
 }
 
 /** Bounces that have a layer of their own. */
@@ -30,14 +36,15 @@ export function viewPanel(app: App): HTMLElement {
     id: 'layer', 'aria-label': 'Layer of light', change: () => app.showLayer(JSON.parse(layer.value) as Layer),
   });
   const resting = el('p', { class: 'warning', id: 'resting' });
-  const low = el('input', { type: 'number', min: 0, step: 'any', 'aria-label': 'Lower end of the scale, lx', change: () => setRange() });
-  const high = el('input', { type: 'number', min: 0, step: 'any', 'aria-label': 'Upper end of the scale, lx', change: () => setRange() });
+  const unit = el('span', { class: 'unit' });
+  const low = el('input', { type: 'number', min: 0, step: 'any', change: () => setRange() });
+  const high = el('input', { type: 'number', min: 0, step: 'any', change: () => setRange() });
   const setRange = () => {
     const range: [number, number] = [low.valueAsNumber, high.valueAsNumber];
     if (range[0] > 0 && range[1] > range[0]) app.exposure.setRange(range);
     else app.say('The scale goes from a number above 0 to a larger one.');
   };
-  const scale = el('div', { class: 'row scale-row' }, el('span', { class: 'quiet' }, 'Scale'), low, el('span', { class: 'quiet' }, 'to'), high, el('span', { class: 'unit' }, 'lx'),
+  const scale = el('div', { class: 'row scale-row' }, el('span', { class: 'quiet' }, 'Scale'), low, el('span', { class: 'quiet' }, 'to'), high, unit,
     button('Auto', () => app.exposure.setRange(null), { title: 'Fit the scale to what is seen' }));
 
   const options = () => {
@@ -46,7 +53,7 @@ export function viewPanel(app: App): HTMLElement {
     const bounces = Array.from({ length: BOUNCES }, (_, i) => option({ bounce: i + 1 }));
     layer.replaceChildren(option('total'), option('direct'), option('indirect'),
       el('optgroup', { label: 'Bounces' }, ...bounces), lights.length > 0 ? el('optgroup', { label: 'Lights alone' }, ...lights) : '',
-      option('error'));
+      el('optgroup', { label: 'Estimated error' }, option('relative_error'), option('error')));
     layer.value = JSON.stringify(app.layer);
   };
   let names = '';
@@ -65,7 +72,9 @@ export function viewPanel(app: App): HTMLElement {
     layer.value = JSON.stringify(app.layer);
     resting.textContent = app.resting;
     resting.hidden = !app.resting;
-    scale.hidden = !app.falseColours && !shared.isolines.value && app.layer !== 'error' && !app.plane;
+    scale.hidden = !app.falseColours && !shared.isolines.value && !isError(app.layer) && !app.plane;
+    for (const [input, end] of [[low, 'Lower'], [high, 'Upper']] as const) input.setAttribute('aria-label', `${end} end of the scale, ${unitOf(app.layer)}`);
+    unit.textContent = unitOf(app.layer);
     for (const [input, value] of [[low, app.exposure.range[0]], [high, app.exposure.range[1]]] as const) {
       if (!isOpen(input)) input.value = String(Number(value.toPrecision(3)));
     }

@@ -141,8 +141,10 @@ pub enum Layer {
     Bounce(u32),
     /// All that one light brings, reflected light too; before columns are solved, its direct light only.
     Light(LightId),
-    /// One standard error of the total.
+    /// One standard error of the total by the rays of rows, lux.
     Error,
+    /// The same in percent of the light that is there, in all bands alike; at most 100.
+    RelativeError,
 }
 
 /// Where the light of a place comes from, and what becomes of it. Lux per band.

@@ -16,6 +16,20 @@ const MOST_BOUNCES: u32 = 64;
 /// Layers that are kept, so that several pages may look at several, and bounces follow from those before them.
 const MOST_KEPT: usize = 8;
 
+/// Rays across and down a picture whose error is told: the mean over some hundred elements of a wall is off by a tenth of
+/// itself then, as each knows its own error from two numbers alone.
+const SIGHT: [u32; 2] = [48, 30];
+
+fn of_lanes(lanes: &Lanes<4>) -> f32 {
+    luminance([lanes.0[0], lanes.0[1], lanes.0[2]])
+}
+
+/// An error in percent of the light there; none in the dark, and where it is more than the light nothing is known.
+fn relative(error: &Lanes<4>, h: &Lanes<4>) -> f32 {
+    let (error, h) = (of_lanes(error).abs(), of_lanes(h));
+    if error > 0.0 { (100.0 * error / h.max(error)).min(100.0) } else { 0.0 }
+}
+
 impl Session {
     fn display(&self, object: usize) -> &Display {
         let placed = &self.objects[object];
@@ -137,9 +151,9 @@ impl Session {
         self.lights.iter().enumerate().map(of).collect()
     }
 
-    /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, or for
-    /// [`Layer::Error`] its standard error. What rays found of it is averaged over neighbours that differ by no more than noise.
-    /// Empty for an object that there is not, and for a layer that cannot be told yet ([`Session::has_layer`]). Lights beyond the
+    /// Light at the vertices of an object's mesh ([`ModelObject::positions`]): irradiance in lux per band, its standard error
+    /// for [`Layer::Error`], that in percent for [`Layer::RelativeError`]. What rays found is averaged over neighbours that differ
+    /// by no more than noise, but for errors. Empty for an object that there is not, and for a layer that cannot be told yet ([`Session::has_layer`]). Lights beyond the
     /// 31st share one column, and [`Layer::Light`] shows what all of them bring.
     pub fn light(&self, object: ObjectId, layer: Layer) -> Vec<Bands> {
         let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
@@ -158,7 +172,8 @@ impl Session {
             chunks.get(place).is_some_and(|chunk| chunk.is_buried((element - chunk.first) as usize))
         };
         // An error is not made less.
-        let weights = (layer != Layer::Error).then(|| self.weights(object.0 as usize, first, is_buried)).flatten();
+        let is_error = matches!(layer, Layer::Error | Layer::RelativeError);
+        let weights = (!is_error).then(|| self.weights(object.0 as usize, first, is_buried)).flatten();
         self.display(object.0 as usize).light(at, weights.as_deref(), is_buried)
     }
 
@@ -255,7 +270,7 @@ impl Session {
                 self.live.add_direct(&columns, &mut by_id);
                 by_id
             }),
-            Layer::Indirect | Layer::Bounce(_) | Layer::Error => Vec::new(),
+            Layer::Indirect | Layer::Bounce(_) | Layer::Error | Layer::RelativeError => Vec::new(),
         }
     }
 
@@ -326,11 +341,53 @@ impl Session {
                 by_id
             }),
             Layer::Error => {
-                let mut errors = self.standard_errors();
+                let mut errors = self.errors();
                 errors.iter_mut().for_each(|error| error.0 = error.0.map(f32::abs));
                 errors
             }
+            Layer::RelativeError => {
+                let mut errors = self.errors();
+                errors.iter_mut().zip(&state.shown).for_each(|(error, h)| *error = Lanes([relative(error, h); 4]));
+                errors
+            }
         }
+    }
+
+    /// One standard error of the light of each element, with its sign.
+    fn errors(&self) -> Vec<Lanes<4>> {
+        if self.state.errors.is_empty() { self.find_errors() } else { self.state.errors.clone() }
+    }
+
+    /// How far the light that a camera sees is known: one standard error by the rays of rows over the light there, in the mean
+    /// over the picture; at most 1, as where nothing is known. It does not matter how bright a place is, so that a lawn in the sun
+    /// does not speak for the room behind the window. Shadow rays and the elements' size are not in it.
+    ///
+    /// The matrix is the world from the camera, by columns, and `fov` the vertical angle of view, radians. None while the error is
+    /// not known, and where no surface that is lit is seen.
+    pub fn error_in_sight(&self, matrix: &[f64; 16], fov: f64, aspect: f64) -> Option<f64> {
+        let (world, errors) = (self.live.world(), &self.state.errors);
+        let camera = glam::DMat4::from_cols_array(matrix);
+        let eye = camera.transform_point3(glam::DVec3::ZERO) - world.middle;
+        let half = (0.5 * fov).tan();
+        let is_sound = camera.is_finite() && (0.0..1e6).contains(&half) && (1e-3..1e3).contains(&aspect);
+        if errors.is_empty() || !is_sound {
+            return None;
+        }
+        let (mut sum, mut count) = (0f64, 0u32);
+        for pixel in 0..SIGHT[0] * SIGHT[1] {
+            let at = [pixel % SIGHT[0], pixel / SIGHT[0]];
+            let [x, y] = [0, 1].map(|k| 2.0 * (f64::from(at[k]) + 0.5) / f64::from(SIGHT[k]) - 1.0);
+            let direction = camera.transform_vector3(glam::DVec3::new(x * half * aspect, y * half, -1.0));
+            let seen = world.seen(eye, direction.normalize_or_zero()).map(|id| id as usize);
+            let Some((error, h)) = seen.and_then(|id| Some((errors.get(id)?, self.state.shown.get(id)?))) else {
+                continue;
+            };
+            if of_lanes(h) > 0.0 {
+                sum += f64::from(relative(error, h)) / 100.0;
+                count += 1;
+            }
+        }
+        (count > 0).then(|| sum / f64::from(count))
     }
 
     /// What is known of a place on an object: `triangle` counts the object's [`ModelObject::indices`] by threes, `uv` are

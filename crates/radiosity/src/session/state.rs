@@ -73,8 +73,9 @@ pub struct State {
     pub solved_rays: u32,
     /// Relative standard error of what is shown; infinite while it is dark, and where that is not known.
     pub error: f64,
-    /// Whether `error` was looked for in what is shown.
-    is_judged: bool,
+    /// Half the differences between the halves of rows, lux per band by id: one standard error of each in what is shown. Empty
+    /// where they were not looked for.
+    pub errors: Vec<Lanes<4>>,
     /// Of the last solve.
     pub residual: f64,
     /// Objects whose light is another than last told.
@@ -124,7 +125,7 @@ impl State {
 impl Session {
     /// Whether nothing is left to do.
     pub(super) fn is_done(&self) -> bool {
-        self.state.has_columns && self.state.is_summed && self.state.rest.is_some() && self.state.is_judged
+        self.state.has_columns && self.state.is_summed && self.state.rest.is_some() && !self.state.errors.is_empty()
     }
 
     /// One piece of work: as many rays as there is time for, or a sweep.
@@ -491,11 +492,12 @@ impl Session {
         state.factors = factors;
         state.revision += 1;
         // The noise of other light says nothing of this.
-        (state.error, state.is_judged) = (f64::INFINITY, false);
+        state.error = f64::INFINITY;
+        state.errors.clear();
     }
 
-    /// Half the differences between the halves of rows, lux per band by id: one standard error of each.
-    pub(super) fn standard_errors(&self) -> Vec<Lanes<4>> {
+    /// Half the differences between the halves of rows of what is shown.
+    pub(super) fn find_errors(&self) -> Vec<Lanes<4>> {
         let mut differences = vec![Lanes::default(); self.live.ids()];
         let rays = self.state.solved_rays as usize;
         if rays > 0 && self.state.given.len() == self.live.ids() {
@@ -506,7 +508,7 @@ impl Session {
 
     /// Estimates the error of what is shown.
     fn judge(&mut self) {
-        let differences = self.standard_errors();
+        let differences = self.find_errors();
         let (mut square, mut whole) = (0f64, 0f64);
         for ((difference, h), area) in differences.iter().zip(&self.state.shown).zip(&self.answer.area) {
             let of = |lanes: &Lanes<4>| f64::from(luminance([lanes.0[0], lanes.0[1], lanes.0[2]]));
@@ -514,7 +516,7 @@ impl Session {
             whole += f64::from(*area) * of(h).powi(2);
         }
         self.state.error = if whole > 0.0 { (square / whole).sqrt() } else { 0.0 };
-        self.state.is_judged = true;
+        self.state.errors = differences;
     }
 }
 

@@ -17,6 +17,9 @@ pub const REACH: f64 = 4.0;
 /// Objects with trees of their own beyond which one tree is built for all: each costs every ray a look at its box.
 const MOST_APART: usize = 6;
 
+/// Backs that one sees through along a line: of more, as in a stack of one-sided sheets, what is behind is not told.
+const MOST_BACKS: u32 = 64;
+
 /// All objects.
 pub struct World {
     /// The scene as handed in, for its pictures.
@@ -265,6 +268,22 @@ impl World {
         let body = &self.bodies[self.body_of(met.triangle)];
         let element = body.shape.at(met.triangle - body.first_triangle, met.uv[0], met.uv[1], met.back);
         body.first + element.unwrap_or(body.elements())
+    }
+
+    /// The id of what is seen from a point that need not be on a surface: backs of one-sided surfaces are seen through. None if
+    /// there is nothing, or the sky.
+    pub fn seen(&self, from: DVec3, direction: DVec3) -> Option<u32> {
+        let mut place = Place { point: from, normal: direction, triangle: u32::MAX };
+        for _ in 0..MOST_BACKS {
+            let met = self.first(&self.ray(&place, direction, f64::INFINITY), 0)?;
+            let id = self.id(Some(met), direction);
+            if !self.body_of_id(id).is_some_and(|body| self.bodies[body].dark() == id) {
+                return Some(id);
+            }
+            place.point += (self.offset + f64::from(met.key)) * direction;
+            place.triangle = met.triangle;
+        }
+        None
     }
 
     /// Whether a surface stops a ray, as the picture on it and chance have it.
