@@ -1,9 +1,10 @@
 // All that the page knows, and what can be done with it. Panels and keys call the verbs here and listen to topics.
 import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
 import { Ahead } from './ahead';
+import { cover } from './cover';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
-import { lay, read, type Grid } from './grid';
+import { follow, lay, open, read, type Grid } from './grid';
 import { beside, lampAhead, type Lamp, type LampKind } from './lamps';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
@@ -341,7 +342,7 @@ export class App {
     if (now === this.asked) return;
     this.asked = now;
     this.askProbe();
-    this.readGrid();
+    if (this.grid) this.readGrid();
     this.planes.ask();
   }
 
@@ -737,8 +738,9 @@ export class App {
     this.plane = null;
     this.marks.plane(null);
     this.grid = lay(this.probed.hit);
+    this.gridMoves = -1;
     if (!this.grid) this.say('There is no plane surface to lay a grid over.');
-    this.marks.grid(this.grid);
+    this.readGrid();
     this.tell('grid');
     this.tell('view');
   }
@@ -780,9 +782,18 @@ export class App {
   }
 
   /** The grid where its surface is now, in the light of now. */
+  private gridMoves = 0;
+
   private readGrid(): void {
-    if (!this.grid) return;
-    read(this.grid);
+    if (this.grid && this.gridMoves !== this.stage.moves) {
+      this.gridMoves = this.stage.moves;
+      cover(this, this.grid, follow(this.grid));
+    }
+    if (this.grid && open(this.grid).length === 0) {
+      this.say('All points of the grid lie beneath things.');
+      this.grid = null;
+    }
+    if (this.grid) read(this.grid);
     this.marks.grid(this.grid);
     this.tell('grid');
   }

@@ -13,11 +13,16 @@ export interface GridPoint {
   uv: [number, number];
   /** Of the layer that is shown. */
   lux: number;
+  /** Whether it lies beneath something: it does not count then. */
+  isCovered: boolean;
 }
 
 /** A grid that was laid. */
 export interface Grid {
   surface: Surface;
+  /** Where it was picked: the triangle, and weights of its corners 1 and 2. */
+  picked: Pick<GridPoint, 'triangle' | 'uv'>;
+  /** All of them; figures are of those that are not covered. */
   points: GridPoint[];
   /** Sides of the surface and of a cell, metres. */
   size: [number, number];
@@ -52,7 +57,7 @@ export function cells(size: [number, number]): [number, number] {
 }
 
 /** Lays a grid over the plane that was hit. */
-export function lay({ surface, triangle }: Hit): Grid | null {
+export function lay({ surface, triangle, uv }: Hit): Grid | null {
   const world = (k: number) => corners(surface, k).map((p) => p.applyMatrix4(surface.matrixWorld));
   const normalOf = ([a, b, c]: Vector3[]) => b.clone().sub(a).cross(c.clone().sub(a)).normalize();
   const first = world(triangle);
@@ -98,12 +103,12 @@ export function lay({ surface, triangle }: Hit): Grid | null {
       const at = origin.clone().addScaledVector(u, low[0] + (i + 0.5) * cell[0]).addScaledVector(v, low[1] + (j + 0.5) * cell[1]);
       const ray = new Ray(at.clone().addScaledVector(normal, 2 * thick), normal.clone().negate()).applyMatrix4(inverse);
       const hit = surface.tree.raycast(ray, DoubleSide).find(({ faceIndex }) => own.has(faceIndex!));
-      if (hit) points.push({ point: at, triangle: hit.faceIndex!, uv: barycentric(surface, hit.faceIndex!, hit.point), lux: 0 });
+      if (hit) points.push({ point: at, triangle: hit.faceIndex!, uv: barycentric(surface, hit.faceIndex!, hit.point), lux: 0, isCovered: false });
     }
   }
   if (points.length === 0) return null;
-  const grid: Grid = { surface, points, size, cell, isCoarse, normal, least: 0, mean: 0, largest: 0, uniformity: 0 };
-  read(grid);
+  const picked = { triangle, uv };
+  const grid: Grid = { surface, picked, points, size, cell, isCoarse, normal, least: 0, mean: 0, largest: 0, uniformity: 0 };
   return grid;
 }
 
@@ -119,18 +124,30 @@ export function luxAt(surface: Surface, triangle: number, [v, w]: [number, numbe
   return luminance(light);
 }
 
-/** Reads a grid where its surface is now, in the light that is shown now. */
-export function read(grid: Grid): void {
+/** Puts the points of a grid where its surface is now; what comes back is where it was picked. */
+export function follow(grid: Grid): Vector3 {
   const { surface } = grid;
-  for (const point of grid.points) {
-    const [v, w] = point.uv;
-    const [a, b, c] = corners(surface, point.triangle).map((corner) => corner.applyMatrix4(surface.matrixWorld));
-    point.point.copy(a).multiplyScalar(1 - v - w).addScaledVector(b, v).addScaledVector(c, w);
-    grid.normal.copy(b.sub(a).cross(c.sub(a)).normalize());
-    point.lux = luxAt(surface, point.triangle, point.uv);
-  }
-  const lux = grid.points.map((point) => point.lux);
-  grid.mean = lux.reduce((a, b) => a + b, 0) / lux.length;
+  const place = ({ triangle, uv: [v, w] }: Grid['picked']) => {
+    const [a, b, c] = corners(surface, triangle).map((corner) => corner.applyMatrix4(surface.matrixWorld));
+    grid.normal.copy(b.clone().sub(a).cross(c.clone().sub(a)).normalize());
+    return a.multiplyScalar(1 - v - w).addScaledVector(b, v).addScaledVector(c, w);
+  };
+  grid.points.forEach((point) => point.point.copy(place(point)));
+  return place(grid.picked);
+}
+
+/** The points of a grid that count. */
+export function open({ points }: Grid): GridPoint[] {
+  return points.filter((point) => !point.isCovered);
+}
+
+/** Reads a grid in the light that is shown now. */
+export function read(grid: Grid): void {
+  const lux = open(grid).map((point) => {
+    point.lux = luxAt(grid.surface, point.triangle, point.uv);
+    return point.lux;
+  });
+  grid.mean = lux.reduce((a, b) => a + b, 0) / Math.max(1, lux.length);
   [grid.least, grid.largest] = lux.reduce(([least, largest], x) => [Math.min(least, x), Math.max(largest, x)], [Infinity, 0]);
   grid.uniformity = grid.mean > 0 ? grid.least / grid.mean : 0;
 }

@@ -4,7 +4,7 @@ import {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh,
   MeshBasicMaterial, type Object3D, Points, PointsMaterial, RingGeometry, Sprite, SpriteMaterial, SRGBColorSpace, Vector3, WireframeGeometry,
 } from 'three';
-import type { Grid } from './grid';
+import { open, type Grid } from './grid';
 import { falseColour } from './scale';
 import { ACCENT, discard, type Hit, type Stage } from './stage';
 import { shared, type Surface } from './surface';
@@ -118,7 +118,7 @@ export class Marks {
     if (this.gridded) discard(this.gridded);
     this.gridded = null;
     if (grid) {
-      const geometry = new BufferGeometry().setFromPoints(grid.points.map((p) => p.point.clone().addScaledVector(grid.normal, 1e-3)));
+      const geometry = new BufferGeometry().setFromPoints(open(grid).map((p) => p.point.clone().addScaledVector(grid.normal, 1e-3)));
       const dots = new Points(geometry, new PointsMaterial({ color: 0xffffff, size: 4, sizeAttenuation: false, depthTest: false, transparent: true }));
       dots.renderOrder = 4;
       this.gridded = new Group().add(dots);

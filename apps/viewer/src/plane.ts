@@ -2,6 +2,7 @@
 // changes, and says so while what it tells is older than what is seen.
 import type { Vector3 } from 'three';
 import type { App } from './app';
+import { open } from './grid';
 import type { Surface } from './surface';
 import type { PlaneAnswer } from './wire';
 
@@ -67,5 +68,5 @@ export function lateness({ plane, status }: App): string {
 /** The points that are written on the picture and saved: of the plane or of the grid. */
 export function measured({ plane, grid, stage }: App): { point: Vector3; lux: number }[] {
   if (plane?.answer) return plane.answer.points.map(([x, y, z, lux]) => ({ point: stage.toWorld([x, y, z]), lux }));
-  return grid?.points ?? [];
+  return grid ? open(grid) : [];
 }

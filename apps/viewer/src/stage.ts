@@ -63,6 +63,8 @@ export class Stage {
   readonly bounds = new Box3(new Vector3(-1, 0, -1), new Vector3(1, 2, 1));
   readonly outline = new Outline(ACCENT);
   frames = 0;
+  /** Counts what came, went or moved. */
+  moves = 0;
   private dirty = true;
   private boxes = new Map<number, Box3>();
   private sky: Mesh<SphereGeometry, ShaderMaterial>;
@@ -186,11 +188,17 @@ export class Stage {
 
   /** A surface is elsewhere, or there no longer. */
   moved(surface: Surface): void {
+    this.moves += 1;
     surface.updateMatrixWorld(true);
     this.batches.place(surface);
     surface.geometry.boundingBox ?? surface.geometry.computeBoundingBox();
     this.boxes.set(surface.object, surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld));
     this.change();
+  }
+
+  /** What is around a surface in the world. */
+  box(surface: Surface): Box3 {
+    return this.boxes.get(surface.object)!;
   }
 
   /** Draws if there is something new; else a tree of boxes is built where one is missing. */

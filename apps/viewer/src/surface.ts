@@ -168,9 +168,19 @@ export interface Look {
 /** What rays take the side from; the stage draws surfaces together, with a material of their own. */
 const PLAIN = new MeshBasicMaterial({ side: FrontSide });
 
+/** Backs follow the fronts, with corners 1 and 2 exchanged. */
+function countFronts({ positions, indices }: MeshFrame): number {
+  const [all, half] = [indices.length / 3, indices.length / 6];
+  const at = (corner: number) => positions.subarray(3 * indices[corner], 3 * indices[corner] + 3).join();
+  const hasBacks = Number.isInteger(half) && [0, 1, 2].every((k) => at(k) === at(3 * half + [0, 2, 1][k]));
+  return hasBacks ? half : all;
+}
+
 /** An object on the stage. By itself only its outline is drawn. */
 export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
   readonly light: Float16BufferAttribute;
+  /** How many of its triangles are fronts: all of them, or half where backs have light of their own. */
+  readonly fronts: number;
   look: Look = { tint: [1, 1, 1], emission: [0, 0, 0], transmittance: [0, 0, 0], texture: null };
   /** For each vertex that on the other side of a sheet. */
   private others: Uint32Array | null = null;
@@ -188,6 +198,7 @@ export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
     geometry.setAttribute('light', light);
     super(geometry, PLAIN);
     this.light = light;
+    this.fronts = countFronts(frame);
     this.matrixAutoUpdate = false;
     this.layers.disableAll();
   }

@@ -99,7 +99,7 @@ export function tests(app: App) {
       frames: app.stage.frames,
       received: app.connection.received,
       grid: app.grid && {
-        least: app.grid.least, mean: app.grid.mean, largest: app.grid.largest, count: app.grid.points.length, cell: app.grid.cell, size: app.grid.size,
+        least: app.grid.least, mean: app.grid.mean, largest: app.grid.largest, count: app.grid.points.length, covered: app.grid.points.filter(({ isCovered }) => isCovered).length, cell: app.grid.cell, size: app.grid.size,
         first: app.grid.points[0].point.toArray(),
       },
       plane: app.plane && { height: app.plane.height, border: app.plane.border, ...app.plane.answer },

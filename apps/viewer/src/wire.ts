@@ -123,6 +123,8 @@ export interface PlaneAnswer {
   mean: number;
   most: number;
   uniformity: number;
+  /** Points that are left out, as they are within things. */
+  covered: number;
   /** Standard error of a point by its rays, over the mean. */
   error: number;
   /** Edits that are in it. */

@@ -102,6 +102,44 @@ test('a measuring grid stays where it was laid, as fine as the standard asks', a
   await page.context().close();
 });
 
+test('points of a grid beneath things are left out and counted', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const laid = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.pick(0, -0.9);
+    app.measure();
+    return window.radiosity.state().grid;
+  });
+  // Both blocks have no base: where their sides meet the floor, metres.
+  const blocks = [[[0.13, 0.065], [0.29, 0.114], [0.24, 0.272], [0.082, 0.225]], [[0.423, 0.247], [0.472, 0.406], [0.314, 0.456], [0.265, 0.296]]];
+  const isBeneath = ([x, z]) => blocks.some((corners) => corners.every(([x0, z0], k) => {
+    const [x1, z1] = corners[(k + 1) % 4];
+    return (x1 - x0) * (z - z0) - (z1 - z0) * (x - x0) > 0;
+  }));
+  const points = await page.evaluate(() => window.radiosity.app.grid.points.map(({ point: { x, z }, isCovered }) => [x, z, isCovered]));
+  for (const point of points) assert.equal(point[2], isBeneath(point), String(point));
+  assert.ok(laid.covered > 1, `${laid.covered}`);
+  assert.ok(laid.least > 0.1 * laid.mean, `${laid.least} of ${laid.mean} lx: nothing is read beneath them`);
+  assert.match(await page.locator('#grid .facts').textContent(), new RegExp(`Points${laid.count - laid.covered}Covered, left out${laid.covered}`));
+  // A mat of 3 mm where there is nothing, and away again.
+  const { edits } = (await state(page)).status;
+  const matted = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const block = [...app.objects.values()].find(({ name }) => name === 'short block');
+    app.edit({ copy: { object: block.id, matrix: [1, 0, 0, 0, 0, 0.02, 0, 0, 0, 0, 1, 0, 0.2, 0, -0.02, 1] } });
+    return block.id;
+  });
+  assert.ok(matted >= 0);
+  await done(page, edits + 1);
+  await page.waitForFunction((covered) => window.radiosity.state().grid.covered > covered, laid.covered);
+  assert.ok((await state(page)).grid.least > 0.1 * laid.mean);
+  await page.keyboard.press('Control+z');
+  await page.waitForFunction((covered) => window.radiosity.state().grid.covered === covered, laid.covered);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('a working plane lies in the air of the room, as `measure` has it, and follows changes', async () => {
   const page = await pages.open(program.url);
   await done(page);

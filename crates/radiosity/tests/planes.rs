@@ -163,6 +163,7 @@ fn points_keep_off_things_and_walls() {
             "on this side of the partition, half a metre off: {at:?}"
         );
         assert_eq!(at.iter().any(|p| is_in_chest(*p)), !has_chest, "{height}");
+        assert_eq!(reading.figures.covered > 0, has_chest, "{height}");
         // The room goes on behind the chest.
         for corner in [v(0.7, height, 0.7), v(0.7, height, 3.3), v(3.2, height, 0.7), v(3.2, height, 3.3)] {
             assert!(at.iter().any(|p| p.distance(corner) < 0.5), "{corner}");

@@ -1,6 +1,7 @@
 // What is measured: at a point, and on a grid.
 import type { App } from '../app';
 import { savePoints } from '../files';
+import { open } from '../grid';
 import { luminance } from '../luminance';
 import { lateness } from '../plane';
 import { readable } from '../scale';
@@ -72,17 +73,20 @@ export function gridPanel(app: App): HTMLElement {
       : [lateness(app), plane && app.layer !== 'total' ? 'Of all light, whichever layer is shown.' : ''].filter(Boolean).join(' ');
     warning.hidden = !warning.textContent;
     const answer = plane?.answer;
-    const told = grid ?? (answer && { ...answer, largest: answer.most, isCoarse: answer.is_coarse });
+    const told = grid
+      ? { ...grid, covered: grid.points.length - open(grid).length }
+      : answer && { ...answer, largest: answer.most, isCoarse: answer.is_coarse };
     csv.hidden = facts.hidden = !told;
     if (!told) return;
     const unit = grid ? unitOf(app.layer) : 'lx';
-    const { least, mean, largest, uniformity, points, cell, size, isCoarse } = told;
+    const { least, mean, largest, uniformity, points, covered, cell, size, isCoarse } = told;
     facts.replaceChildren(
       fact('Mean', `${readable(mean)} ${unit}`),
       fact('Least', `${readable(least)} ${unit}`),
       fact('Most', `${readable(largest)} ${unit}`),
       fact('Uniformity', uniformity.toFixed(2)),
-      fact('Points', String(points.length)),
+      fact('Points', String(grid ? points.length - covered : points.length)),
+      ...(covered > 0 ? [fact('Covered, left out', String(covered))] : []),
       ...(answer ? [fact('Noise of a point', `± ${(100 * answer.error).toPrecision(2)} %`)] : []),
       fact('Cells', metres(cell) + (isCoarse ? ', coarser than the standard' : '')),
       fact(answer ? 'Plane' : 'Surface', metres(size)),
@@ -96,7 +100,7 @@ export function gridPanel(app: App): HTMLElement {
   for (const topic of ['view', 'status'] as const) app.on(topic, () => { if (app.grid || app.plane) app.tell('grid'); });
   element.lastElementChild!.append(
     el('p', { class: 'quiet' }, 'Cells are no larger than EN 12464-1 asks. A grid stays until another is laid.'),
-    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G', title: 'Over the whole plane that was picked, in the layer that is shown' })),
+    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G', title: 'Over the whole plane that was picked, in the layer that is shown; points beneath things are left out' })),
     el('div', { class: 'row' }, button('Working plane above it', () => app.measurePlane(), { key: 'Shift+G', title: 'In the air above the picked floor, as far as the room goes; points within things are left out' })),
     field('Height above it', height), field('Left out along walls', border),
     warning, facts, el('div', { class: 'row' }, csv, clear));

@@ -140,6 +140,8 @@ pub struct PlaneFigures {
     pub most: f32,
     /// Least over mean.
     pub uniformity: f32,
+    /// Points that are left out as they are within things.
+    pub covered: usize,
     /// One standard error of a point, in the root mean square, over the mean: by rays alone, the elements' size is not in it.
     pub error: f32,
 }
@@ -422,6 +424,7 @@ impl Session {
         let square = points.iter().map(|point| f64::from(point.error).powi(2)).sum::<f64>() / count;
         let least = points.iter().map(|point| point.lux).fold(f32::INFINITY, f32::min);
         let over = |x: f64| if mean > 0.0 { (x / mean) as f32 } else { 0.0 };
+        let covered = plane.cells.iter().zip(&is_reached).filter(|of| of == &(&Cell::Inside, &true)).count();
         let figures = PlaneFigures {
             size: [0, 1].map(|k| layout.cell[k] * layout.counts[k] as f64),
             cell: layout.cell.to_array(),
@@ -431,6 +434,7 @@ impl Session {
             mean: mean as f32,
             most: points.iter().map(|point| point.lux).fold(0.0, f32::max),
             uniformity: over(f64::from(least)),
+            covered,
             error: over(square.sqrt()),
         };
         Ok(PlaneReading { points, figures })
