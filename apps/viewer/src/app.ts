@@ -451,7 +451,7 @@ export class App {
     });
   }
 
-  /** Lets what is selected be moved, though it is large. */
+  /** Lets what is selected be moved, though it is part of the building. */
   loosen(): void {
     const object = this.selected === null ? undefined : this.objects.get(this.selected);
     if (object) this.loosened.add(object.group);
@@ -486,7 +486,7 @@ export class App {
   nudge(way: Vector3, angle: number, tilt = 0): void {
     const spot = this.spot();
     if (!spot) {
-      if (this.selected !== null) this.say('It is large and stays put, unless “Let it move” is pressed in the panel.');
+      if (this.selected !== null) this.say('It is part of the building and stays put, unless “Let it move” is pressed in the panel.');
       return;
     }
     const right = new Vector3(1, 0, 0).applyQuaternion(this.stage.camera.quaternion).setY(0).normalize();

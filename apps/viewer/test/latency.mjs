@@ -100,7 +100,7 @@ async function measure() {
   const painted = named(movable.length > 0 ? movable : all);
   await changes(`painting '${painted.name}'`, 11, (i) => ({ reflectance: { object: painted.id, reflectance: [0.2, 0.3 + 0.03 * i, 0.4] } }));
   const moved = named(movable);
-  if (!moved) return console.log('moving: there is no thing that is less than half as wide as the scene');
+  if (!moved) return console.log('moving: there is no thing that can be moved');
   const group = movable.filter((object) => object.group === moved.group);
   await changes(`moving '${moved.name}'`, 11, (i) => ({
     several: group.map(({ id }) => ({ move: { object: id, matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.02 * (i + 1), 0, 0.01 * (i + 1), 1] } })),

@@ -302,3 +302,76 @@ fn edits_are_followed() {
     finish(&mut session);
     assert_eq!(read(&session, question), Err(PlaneError::NoSurface));
 }
+
+/// What people would move, by name.
+fn movable(scene: Scene) -> Vec<String> {
+    let session = Session::new(scene, &SessionOptions { elements: 500, ..SessionOptions::default() }).unwrap();
+    let mut names: Vec<String> =
+        session.model().objects.into_iter().filter(|object| object.movable).map(|object| object.name).collect();
+    names.dedup();
+    names
+}
+
+/// A chest, a rug of half the room's width, and a partition from floor to ceiling with a door beside it.
+fn furnish(scene: &mut Scene) {
+    let v = DVec3::new;
+    add_box(scene, "chest", v(0.9, 0.0, 0.9), v(2.1, 0.9, 2.1));
+    add_box(scene, "rug", v(2.4, 0.0, 0.5), v(3.6, 0.01, 3.0));
+    add_box(scene, "partition", v(4.0, 0.0, 0.9), v(4.1, 3.0, 4.0));
+    // What is bounded by furniture alone is furniture.
+    add_box(scene, "shelf", v(4.6, 0.0, 3.6), v(4.7, 1.8, 3.9));
+    add_box(scene, "shelf", v(5.8, 0.0, 3.6), v(5.9, 1.8, 3.9));
+    add_box(scene, "shelf", v(4.6, 1.8, 3.6), v(5.9, 1.9, 3.9));
+    add_box(scene, "box on the shelf", v(4.8, 0.0, 3.7), v(5.7, 1.79, 3.8));
+}
+
+#[test]
+fn furniture_is_moved_and_buildings_are_not() {
+    let v = DVec3::new;
+    let furniture = ["chest", "rug", "shelf", "box on the shelf"];
+    let mut alone = black_room();
+    furnish(&mut alone);
+    assert_eq!(movable(alone.clone()), furniture, "a room");
+
+    let mut askew = alone.clone();
+    let turn = DMat4::from_rotation_y(0.3);
+    askew.positions.iter_mut().for_each(|p| *p = turn.transform_point3(*p));
+    assert_eq!(movable(askew), furniture, "a room that stands askew");
+
+    let mut small = alone.clone();
+    small.positions.iter_mut().for_each(|p| *p *= 0.1);
+    assert_eq!(movable(small), furniture, "a model of a room");
+
+    let mut garden = alone.clone();
+    add_box(&mut garden, "house", v(-0.3, -0.3, -0.3), v(6.3, 3.3, 4.3));
+    garden.add_quad("garden", 0, [v(-40., -0.3, -40.), v(-40., -0.3, 40.), v(40., -0.3, 40.), v(40., -0.3, -40.)]);
+    add_box(&mut garden, "bench", v(-9.0, -0.3, 2.0), v(-7.0, 0.2, 2.5));
+    assert_eq!(movable(garden), ["chest", "rug", "shelf", "box on the shelf", "bench"], "a room in a garden");
+
+    // Rooms side by side, each with walls and things of its own.
+    let mut building = alone.clone();
+    for k in 1..6 {
+        let shift = v(6.2 * f64::from(k), 0.0, 0.0);
+        for object in alone.objects.clone() {
+            // Quadrilaterals of two triangles each.
+            for pair in alone.triangles[object.triangles].chunks_exact(2) {
+                let corners =
+                    [pair[0][0], pair[0][1], pair[0][2], pair[1][2]].map(|p| alone.positions[p as usize] + shift);
+                building.add_quad(&format!("{} {k}", object.name), 0, corners);
+            }
+        }
+    }
+    let names = movable(building);
+    assert!(names.iter().all(|name| furniture.iter().any(|thing| name.starts_with(thing))), "{names:?}");
+    assert_eq!(names.len(), 24, "{names:?}");
+
+    // One thing is the scene; on a ground that is wider it is one that can be moved.
+    let mut thing = Scene::default();
+    thing.materials.push(radiosity::Material::default());
+    add_box(&mut thing, "thing", v(0.0, 0.0, 0.0), v(2.0, 1.0, 1.0));
+    assert_eq!(movable(thing.clone()), [""; 0]);
+    thing.add_quad("ground", 0, [v(-4., 0., -4.), v(-4., 0., 4.), v(4., 0., 4.), v(4., 0., -4.)]);
+    assert_eq!(movable(thing), ["thing"]);
+
+    assert_eq!(movable(radiosity::cornell_box()), ["light", "short block", "tall block"]);
+}

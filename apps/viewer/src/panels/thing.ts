@@ -113,7 +113,7 @@ export function thingPanel(app: App): HTMLElement {
     el('div', { class: 'row' }, mode),
     el('div', { class: 'numbers' }, ...places.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'XYZ'[k]), input)),
       el('label', {}, el('span', { class: 'quiet' }, '°'), turn)));
-  const fixed = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Large, so it stays put.'), button('Let it move', () => app.loosen()));
+  const fixed = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Part of the building, so it stays put.'), button('Let it move', () => app.loosen()));
   const painting = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Reflectance'), paint, reflectance, el('span', { class: 'unit' }, '%'));
   const copying = el('div', { class: 'row' }, copy, remove);
   const body = el('div', {}, name, painting, lighting, moving, fixed, copying);

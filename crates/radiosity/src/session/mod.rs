@@ -37,6 +37,7 @@ mod edit;
 mod edited;
 mod light;
 mod model;
+mod movable;
 mod paint;
 mod plane;
 mod probe;
@@ -156,6 +157,8 @@ struct Placed {
     matrix: [f64; 16],
     light: Option<usize>,
     group: u32,
+    /// Whether people would move it.
+    is_movable: bool,
 }
 
 /// Least shadow rays from an element to a light that are shared out.
@@ -382,7 +385,10 @@ fn placed(scene: &Scene, live: &Live) -> Vec<Placed> {
             matrix: glam::DMat4::IDENTITY.to_cols_array(),
             light: None,
             group,
+            is_movable: true,
         });
     }
+    let guessed = movable::movable(live.world(), &all);
+    all.iter_mut().zip(guessed).for_each(|(placed, is_movable)| placed.is_movable = is_movable);
     all
 }

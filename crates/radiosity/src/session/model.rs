@@ -64,7 +64,7 @@ pub struct ModelObject {
     pub emission: Bands,
     /// Whether it was taken away.
     pub deleted: bool,
-    /// Whether it is small enough that people would move it: less than half as wide as the scene.
+    /// Whether people would move it, as is guessed from the scene as it was handed in: furniture, and not the building.
     pub movable: bool,
     /// The light that it is, if it shines.
     pub light: Option<LightId>,

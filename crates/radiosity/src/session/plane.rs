@@ -28,9 +28,6 @@ const FLAT: f64 = 1e-3;
 /// What rises so far above the floor is a wall, even if it could be moved; a cupboard, and no desk.
 const WALL: f64 = 2.0;
 
-/// An object that is less than this part of the scene wide is taken for one that can be moved.
-const MOVABLE: f64 = 0.5;
-
 /// Walls are looked for as high as the plane, and above skirtings and thresholds.
 const SKIRTING: f64 = 0.1;
 
@@ -245,13 +242,6 @@ impl Session {
         reading.transpose()
     }
 
-    /// Whether an object is small enough that people would move it.
-    pub(super) fn is_movable(&self, body: usize) -> bool {
-        let world = self.live.world();
-        let Bounds { low, high } = world.bodies[body].bounds;
-        (high - low).max_element() < MOVABLE * 2.0 * world.half
-    }
-
     fn lay(&self, question: &PlaneQuestion) -> Result<Layout, PlaneError> {
         let PlaneQuestion { object, triangle, uv, height, border } = *question;
         if [height, border].iter().any(|length| !(0.0..=1000.0).contains(length)) {
@@ -287,7 +277,8 @@ impl Session {
         let cell = size / DVec2::new(counts[0] as f64, counts[1] as f64);
 
         let floor = origin.dot(up);
-        let is_wall = |index: usize| !self.is_movable(index) || world.bodies[index].bounds.high.dot(up) > floor + WALL;
+        let is_wall =
+            |index: usize| !self.objects[index].is_movable || world.bodies[index].bounds.high.dot(up) > floor + WALL;
         let mut things: BTreeMap<u32, (Bounds, Vec<usize>)> = BTreeMap::new();
         for (index, other) in world.bodies.iter().enumerate().filter(|(_, other)| other.is_present) {
             let (bounds, bodies) =

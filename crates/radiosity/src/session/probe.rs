@@ -103,7 +103,7 @@ impl Session {
                     tint: [0.0; 3],
                     emission: [0.0; 3],
                     deleted: false,
-                    movable: false,
+                    movable: placed.is_movable,
                     light: None,
                 });
             }
@@ -113,7 +113,6 @@ impl Session {
             known.tint = std::array::from_fn(|band| base[band] * scale[band]);
             known.emission = std::array::from_fn(|band| mean[band] * factor[band]);
             known.deleted = !body.is_present;
-            known.movable = self.is_movable(index);
             known.light = placed.light.map(|light| LightId(light as u32));
         }
         model.lights = self.model_lights();
