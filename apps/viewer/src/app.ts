@@ -254,6 +254,7 @@ export class App {
   /** A light is shown as it is now. */
   private shed(light: LightNotice): void {
     this.marks.light(light);
+    if (light.type === 'sky') this.stage.dimSky(light.colour.map((band) => band * light.dimming));
     if (light.id === this.selectedLight) {
       if (light.deleted) this.selectLight(null);
       else this.gizmo.place();
@@ -616,7 +617,8 @@ export class App {
   }
 
   /** What people call a light: copies have the name of the first, and numbers. */
-  lightName({ id, name }: LightNotice): string {
+  lightName({ id, name, type }: LightNotice): string {
+    if (type === 'sky') return 'Sky';
     if (!name) return `Light ${id + 1}`;
     const before = [...this.lights.values()].filter((light) => light.id < id && light.name === name).length;
     return before > 0 ? `${name} (${before + 1})` : name;

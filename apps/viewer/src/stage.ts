@@ -90,7 +90,7 @@ export class Stage {
       side: BackSide,
       depthTest: false,
       depthWrite: false,
-      uniforms: { ...shared, picture: { value: null }, hasPicture: { value: false } },
+      uniforms: { ...shared, picture: { value: null }, hasPicture: { value: false }, dimming: { value: new Vector3(1, 1, 1) } },
       vertexShader: /* glsl */ `
         out vec3 direction;
         void main() {
@@ -104,13 +104,14 @@ export class Stage {
         uniform float exposure;
         uniform sampler2D picture;
         uniform bool hasPicture;
+        uniform vec3 dimming;
         out vec4 outColour;
         ${DISPLAY}
         void main() {
           vec3 d = normalize(direction);
           vec3 background = vec3(0.055, 0.059, 0.066);
           vec2 at = vec2(atan(d.z, d.x) / 6.28318530718 + 0.5, acos(clamp(d.y, -1.0, 1.0)) / 3.14159265359);
-          vec3 colour = hasPicture ? display(texture(picture, at).rgb, exposure) : background;
+          vec3 colour = hasPicture ? display(texture(picture, at).rgb * dimming, exposure) : background;
           outColour = mode == ${Mode.Meter} ? vec4(0.0) : vec4(mode == ${Mode.Lux} ? background : colour, 1.0);
         }`,
     }));
@@ -146,6 +147,12 @@ export class Stage {
       this.sky.material.uniforms.picture.value = texture;
       this.sky.material.uniforms.hasPicture.value = true;
     }
+    this.change();
+  }
+
+  /** The sky is by so much darker or brighter in each band than in the file. */
+  dimSky(factor: number[]): void {
+    (this.sky.material.uniforms.dimming.value as Vector3).fromArray(factor);
     this.change();
   }
 

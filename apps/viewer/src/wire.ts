@@ -60,6 +60,8 @@ export interface LightNotice {
   colour: [number, number, number];
   /** Candela, or lux of parallel light, before it is dimmed and coloured; none with area. */
   intensity: number[] | null;
+  /** Lux before it is dimmed and coloured: of the sky on open level ground, of parallel light across its rays. */
+  illuminance: number[] | null;
   /** Half angles of a spot, radians: full within the first, nothing beyond the second. */
   cone: number[] | null;
   /** From its place in the file to where it is now. */

@@ -315,6 +315,35 @@ test('lamps and things keep their order where one was changed and the page, or t
   });
 }));
 
+test('the sky is known by its lux, and follows them', async () => {
+  const outside = await view('--sky', 'overcast:5000', ...SMALL);
+  const page = await pages.open(outside.url);
+  await done(page);
+  const sky = (await state(page)).lights.find(({ type }) => type === 'sky');
+  const alone = () => page.evaluate(() => window.radiosity.points(100).reduce((sum, point) => sum + (window.radiosity.lux(point) ?? 0), 0));
+  await page.evaluate((light) => window.radiosity.app.showLayer({ light }), sky.id);
+  await page.waitForFunction(() => window.radiosity.points(20).some((point) => window.radiosity.lux(point) > 0));
+  await done(page);
+  const [before, dark] = [await alone(), () => page.evaluate(() => window.radiosity.app.stage.sky.material.uniforms.dimming.value.toArray())];
+  assert.equal(await page.locator('#layer option:checked').textContent(), 'Sky');
+  const lux = page.getByLabel('Illuminance by Sky, lux');
+  assert.equal(await lux.inputValue(), '5000');
+  await lux.fill('12500');
+  await lux.press('Enter');
+  await done(page, 1);
+  assert.ok(Math.abs((await alone()) / before - 2.5) < 0.01, `${await alone()} of ${before}`);
+  assert.deepEqual(await dark(), [2.5, 2.5, 2.5], 'what is seen of it follows');
+  assert.equal((await state(page)).undo, 'dim sky');
+  // What is no number is as it was.
+  await lux.fill('');
+  await lux.press('Enter');
+  assert.equal(await lux.inputValue(), '12500');
+  await picture(page, 'sky');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+  await outside.end();
+});
+
 test('lamps without area, sheets and colours at vertices', () => inStudio(async (page) => {
   await page.evaluate(() => window.radiosity.app.exposure.set(-5));
 

@@ -40,6 +40,26 @@ impl Sky {
         }
     }
 
+    /// Illuminance of open level ground, lux per band; exact for maps as well, whose pixels are L ∫ sin γ dω bright.
+    pub fn horizontal(&self) -> Bands {
+        match self {
+            Sky::Black => [0.0; 3],
+            Sky::Uniform(luminance) => luminance.map(|l| (PI * f64::from(l)) as f32),
+            Sky::Overcast { horizontal } => *horizontal,
+            Sky::Map { width, height, pixels } => {
+                let square = |row: usize| (0.5 * PI - PI * row as f64 / *height as f64).max(0.0).sin().powi(2);
+                let mut sum = [0f64; 3];
+                for (row, pixels) in pixels.chunks_exact(*width).enumerate() {
+                    let weight = PI / *width as f64 * (square(row) - square(row + 1));
+                    for pixel in pixels {
+                        (0..3).for_each(|band| sum[band] += weight * f64::from(pixel[band]));
+                    }
+                }
+                sum.map(|sum| sum as f32)
+            }
+        }
+    }
+
     /// Luminance (cd/m² per band) seen in the unit `direction`, where `up` is the unit zenith direction.
     pub fn luminance(&self, direction: DVec3, up: DVec3) -> Bands {
         match self {
@@ -445,6 +465,31 @@ mod tests {
         assert_eq!(count(&[(a, 0.1, 1e6), (a, 0.005, 1e9)]), 1);
         assert_eq!(count(&[(a, 0.15, 1e7)]), 0);
         assert_eq!(count(&[(a, 0.005, 1e6)]), 0);
+    }
+
+    /// A map of a sky is as bright on the ground as the sky is, however coarse, and what is below the horizon does not count.
+    #[test]
+    fn maps_of_skies_give_their_illuminance() {
+        let uniform = Sky::Uniform([1.0, 10.0, 1000.0]);
+        for (width, height) in [(1, 2), (7, 5), (64, 33)] {
+            let pixels = vec![[1.0, 10.0, 1000.0]; width * height];
+            let given = Sky::Map { width, height, pixels }.horizontal();
+            for (given, exact) in given.iter().zip(uniform.horizontal()) {
+                assert!((given / exact - 1.0).abs() < 1e-6, "{width} × {height}: {given}, {exact}");
+            }
+        }
+        let overcast = Sky::Overcast { horizontal: [3.0, 4.0, 5.0] };
+        let (width, height) = (4, 400);
+        let elevation = |row: usize| 0.5 * PI - PI * (row as f64 + 0.5) / height as f64;
+        let seen = |i: usize| match elevation(i / width) {
+            above if above > 0.0 => overcast.luminance(DVec3::new(above.cos(), above.sin(), 0.0), DVec3::Y),
+            _ => [1e9; 3],
+        };
+        let given = Sky::Map { width, height, pixels: (0..width * height).map(seen).collect() }.horizontal();
+        for (given, exact) in given.iter().zip(overcast.horizontal()) {
+            assert!((given / exact - 1.0).abs() < 1e-4, "{given}, {exact}");
+        }
+        assert_eq!(Sky::Black.horizontal(), [0.0; 3]);
     }
 
     /// 64 samples to a patch found a sun of 0.53° sometimes and made it up to 17 % too bright.

@@ -469,7 +469,7 @@ impl Solver {
         let light = |id: radiosity::session::LightId| {
             let found = self.model.lights.iter().find(|light| light.id == id);
             found.map_or_else(String::new, |light| match (light.name.as_str(), light.kind) {
-                ("", LightKind::Sky) => "sky".to_owned(),
+                (_, LightKind::Sky) => "Sky".to_owned(),
                 ("", _) => format!("light {}", id.0 + 1),
                 (name, _) => name.to_owned(),
             })

@@ -131,6 +131,8 @@ pub enum Say<'a> {
         colour: Bands,
         /// Candela, or lux of parallel light, before it is dimmed and coloured; none with area.
         intensity: Option<Bands>,
+        /// Lux before it is dimmed and coloured: of the sky on open level ground, of parallel light across its rays.
+        illuminance: Option<Bands>,
         /// Half angles of a spot, radians.
         cone: Option<[f64; 2]>,
         matrix: [f64; 16],
@@ -328,6 +330,7 @@ pub fn light(light: &ModelLight) -> String {
         dimming: light.dimming,
         colour: light.colour,
         intensity: light.intensity,
+        illuminance: light.illuminance,
         cone: light.cone,
         matrix: light.matrix,
         position: light.position,

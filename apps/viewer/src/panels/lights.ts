@@ -50,8 +50,19 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     change: () => app.setLight(light(), { dimming: on.checked ? last || 1 : 0 }),
   });
   const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%' }, (value, isLast) => {
-    app.setLight(light(), { dimming: Math.min(100, Math.max(0, value / 100)) }, during(isLast));
+    app.setLight(light(), { dimming: within(value / 100) }, during(isLast));
   });
+  // Daylight is known by its lux.
+  const lux = el('input', {
+    type: 'number', min: 0, step: 'any', 'aria-label': `Illuminance by ${name}, lux`,
+    title: light().type === 'sky' ? 'On open level ground' : 'Across its rays',
+    change: () => {
+      const { illuminance } = light();
+      if (illuminance && Number.isFinite(lux.valueAsNumber)) app.setLight(light(), { dimming: within(lux.valueAsNumber / luminance(illuminance)) });
+      else app.tell('lights');
+    },
+  });
+  const daylight = el('label', { class: 'row' }, el('span', { class: 'quiet grow' }, light().type === 'sky' ? 'On open ground' : 'Across its rays'), lux, el('span', { class: 'unit' }, 'lx'));
   const colour = el('input', {
     type: 'color', 'aria-label': `Colour of ${name}, relative to its own`, title: 'Colour, relative to its own; its light in lumens stays',
     input: () => app.setLight(light(), { colour: filter(colour.value) }, during(false)),
@@ -62,7 +73,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     click: () => (light().object !== null ? app.select(light().object) : app.selectLight(id)),
   }, el('b', {}, name));
   const element = el('div', { class: 'light' },
-    el('div', { class: 'row' }, el('label', { class: 'toggle bare' }, on, el('i')), find, colour), dimming);
+    el('div', { class: 'row' }, el('label', { class: 'toggle bare' }, on, el('i')), find, colour), dimming, daylight);
   return {
     element,
     set(now) {
@@ -72,11 +83,16 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
       element.hidden = now.deleted;
       element.classList.toggle('off', now.dimming === 0);
       dimming.set(100 * now.dimming);
+      daylight.hidden = !now.illuminance;
+      if (now.illuminance && !isOpen(lux)) lux.value = String(Number((now.dimming * luminance(now.illuminance)).toPrecision(4)));
       const peak = Math.max(...now.colour, 1e-9);
       if (!isOpen(colour)) colour.value = hex(now.colour.map((c) => c / peak));
     },
   };
 }
+
+/** As far as lights can be dimmed and turned up. */
+const within = (dimming: number) => Math.min(100, Math.max(0, dimming));
 
 /** The factor by band that tints light and keeps its luminance. */
 function filter(value: string): [number, number, number] {

@@ -101,6 +101,8 @@ pub struct ModelLight {
     pub colour: Bands,
     /// Of lights without area, before they are dimmed and coloured: candela per band, or lux per band of parallel light.
     pub intensity: Option<Bands>,
+    /// Lux per band, before they are dimmed and coloured: of the sky on open level ground, of parallel light across its rays.
+    pub illuminance: Option<Bands>,
     /// Of spots: the half angles inside which they are as bright as they get, and outside which there is no light, radians.
     pub cone: Option<[f64; 2]>,
     /// Where it is: the middle of an object; nothing for the sky and parallel light.

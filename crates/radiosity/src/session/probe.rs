@@ -136,6 +136,11 @@ impl Session {
                 dimming: light.dimming,
                 colour: light.colour,
                 intensity: light.point.as_ref().map(|point| point.intensity),
+                illuminance: match (light.kind, &light.point) {
+                    (LightKind::Sky, _) => Some(self.scene.sky.horizontal()),
+                    (LightKind::Directional, Some(point)) => Some(point.intensity),
+                    _ => None,
+                },
                 cone: light.point.as_ref().and_then(|point| match point.kind {
                     PointLightKind::Spot { inner, outer } => Some([inner, outer]),
                     _ => None,
