@@ -2,6 +2,7 @@
 import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
 import { Ahead } from './ahead';
 import { cover } from './cover';
+import { keep, kept, numberOf, type Curve } from './curve';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
 import { follow, lay, open, read, type Grid } from './grid';
@@ -59,6 +60,7 @@ export class App {
   /** Why the light of the layer does not follow changes; empty while it does. */
   resting = '';
   falseColours = false;
+  curve = kept();
   edges = false;
   raysShown = false;
   selected: number | null = null;
@@ -723,6 +725,15 @@ export class App {
   private paintMode(): void {
     shared.mode.value = this.falseColours || isError(this.layer) ? Mode.Lux : Mode.Eye;
     this.exposure.meter();
+    this.tell('view');
+    this.stage.change();
+  }
+
+  /** Shows light by another tone curve, on this machine from now on. */
+  setCurve(curve: Curve): void {
+    this.curve = curve;
+    keep(curve);
+    shared.curve.value = numberOf(curve);
     this.tell('view');
     this.stage.change();
   }

@@ -5,6 +5,7 @@ import {
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
 import { outwards, WIDEN } from './border';
+import { kept, numberOf, TONE_MAP } from './curve';
 import { WEIGHTS } from './luminance';
 import { LEVELS, PALETTE } from './scale';
 import type { MeshFrame } from './wire';
@@ -15,22 +16,10 @@ export const UNIT = 16;
 /** What is drawn: light as it is displayed, false colours, or luminance as numbers for the exposure meter. */
 export enum Mode { Eye, Lux, Meter }
 
-/** The curve of crates/scene/src/display.rs, the colours of a scale, and lines of equal illuminance. */
+/** From luminance to what is shown. */
 export const DISPLAY = /* glsl */ `
   const vec3 LUMINANCE = vec3(${WEIGHTS.join(', ')});
-  const float KNEE = 0.5;
-  const float WHITE = 8.0;
-
-  vec3 toneMap(vec3 colour) {
-    float peak = max(colour.r, max(colour.g, colour.b));
-    if (peak <= KNEE) return colour;
-    float range = 1.0 - KNEE;
-    float end = 1.0 - exp(-(WHITE - KNEE) / range);
-    float mapped = KNEE + range * (1.0 - exp(-(peak - KNEE) / range)) / end;
-    float fade = clamp((peak - 1.0) / (WHITE - 1.0), 0.0, 1.0);
-    vec3 hue = colour / peak * mapped;
-    return min(hue + fade * (mapped - hue), 1.0);
-  }
+  ${TONE_MAP}
 
   vec3 srgb(vec3 x) {
     x = clamp(x, 0.0, 1.0);
@@ -145,6 +134,8 @@ export const shared = {
   mode: { value: Mode.Eye },
   /** Dark until the light has been metered: rooms with daylight would be white till then. */
   exposure: { value: 0 },
+  /** The tone curve, by its number. */
+  curve: { value: numberOf(kept()) },
   emissionShown: { value: 1 },
   range: { value: [10, 1000] },
   palette: { value: PALETTE.map((c) => new Vector3(...c)) },

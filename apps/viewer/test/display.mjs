@@ -10,8 +10,15 @@ function toneMap(colour) {
   return colour.map((c) => Math.min(1, (c / peak) * mapped + fade * (mapped - (c / peak) * mapped)));
 }
 
+/** Tone curves that are told by a formula. */
+export const curves = {
+  shoulder: toneMap,
+  linear: (colour) => colour.map((c) => Math.min(1, c)),
+  reinhard: (colour) => colour.map((c) => c / (1 + c)),
+};
+
 /** What a place should look like at an exposure (log2), by the light that falls on it. */
-export function shown({ irradiance, behind, reflectance, transmittance, emission }, exposure) {
+export function shown({ irradiance, behind, reflectance, transmittance, emission }, exposure, curve = 'shoulder') {
   const luminance = irradiance.map((h, k) => (reflectance[k] * h + transmittance[k] * behind[k]) / Math.PI + emission[k]);
-  return toneMap(luminance.map((l) => l * 2 ** exposure)).map((c) => 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055));
+  return curves[curve](luminance.map((l) => l * 2 ** exposure)).map((c) => 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055));
 }

@@ -3,8 +3,9 @@ import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
+import { curves, shown } from './display.mjs';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, picture, restored, state, stuck, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, picture, pixelsOf, restored, state, stuck, view } from './program.mjs';
 import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
@@ -492,6 +493,34 @@ test('the error of what is in sight is told, and that of each place in percent o
   assert.ok(Math.abs(map / (100 * seen) - 1) < 0.15, `${map} on the map, ${100 * seen} told`);
   assert.equal(await page.locator('#legend .unit').textContent(), '%');
   await picture(page, 'error');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('light is shown by the tone curve that is chosen, which is kept', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  await page.evaluate(() => window.radiosity.app.exposure.set(-5));
+  const places = Array.from({ length: 100 }, (_, i) => [((i % 10) + 0.5) / 10, (Math.floor(i / 10) + 0.5) / 10]);
+  const grey = {};
+  for (const name of ['shoulder', 'linear', 'reinhard', 'agx', 'aces']) {
+    await page.locator('#curve').selectOption(name);
+    const known = (await pixelsOf(page, places)).filter(Boolean);
+    assert.ok(known.length > 30, `${known.length}`);
+    grey[name] = known.reduce((sum, { pixel }) => sum + pixel[1], 0) / known.length;
+    if (!curves[name]) continue;
+    for (const place of known) {
+      const right = shown(place, -5, name);
+      place.pixel.forEach((byte, band) => assert.ok(Math.abs(byte - right[band]) <= 2, `${name}: ${place.pixel}, and by its light ${right}`));
+    }
+  }
+  const all = Object.values(grey);
+  assert.equal(new Set(all.map((mean) => mean.toFixed(0))).size, all.length, JSON.stringify(grey));
+  assert.ok(grey.reinhard < grey.linear && all.every((mean) => mean > 20 && mean < 250), JSON.stringify(grey));
+  await picture(page, 'aces');
+  await page.reload();
+  await caughtUp(page);
+  assert.equal(await page.locator('#curve').inputValue(), 'aces');
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });

@@ -1,5 +1,6 @@
 // How the light is shown: exposure, false colours, layers.
 import { isError, type App } from '../app';
+import { CURVES, type Curve } from '../curve';
 import { shared } from '../surface';
 import type { Layer } from '../wire';
 import { button, choice, el, isOpen, section, slider, toggle } from './parts';
@@ -28,6 +29,9 @@ export function viewPanel(app: App): HTMLElement {
   const look = choice('Colours', [['eye', 'As seen', 'F2'], ['lux', 'Lux', 'F2']], (value) => app.showFalseColours(value === 'lux'));
   look.id = 'colours';
   const exposure = slider('Exposure', { min: -16, max: 8, step: 0.1, unit: 'EV' }, (value) => app.exposure.set(value));
+  const curve = el('select', {
+    id: 'curve', 'aria-label': 'Tone curve', title: 'How exposed light becomes what the display shows', change: () => app.setCurve(curve.value as Curve),
+  }, ...CURVES.map(([value, text]) => el('option', { value }, text)));
   const automatic = toggle('Automatic exposure', (is) => (is ? app.exposure.automatic() : app.exposure.set(app.exposure.value)), '0');
   const isolines = toggle('Isolines', (is) => app.showIsolines(is), 'I');
   const edges = toggle('Edges of elements', (is) => app.showEdges(is), 'E');
@@ -65,6 +69,7 @@ export function viewPanel(app: App): HTMLElement {
   app.on('view', () => {
     look.set(app.falseColours ? 'lux' : 'eye');
     exposure.set(app.exposure.value);
+    curve.value = app.curve;
     automatic.set(app.exposure.isAutomatic);
     isolines.set(shared.isolines.value);
     edges.set(app.edges);
@@ -84,6 +89,7 @@ export function viewPanel(app: App): HTMLElement {
     scale,
     el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Layer'), layer), resting,
     el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Exposure'), exposure),
-    automatic, isolines, edges, rays,
+    automatic,
+    el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Tone curve'), curve), isolines, edges, rays,
     el('div', { class: 'row mouse' }, button('Look freely with the mouse', () => app.lookFreely(), { key: 'Y' })));
 }
