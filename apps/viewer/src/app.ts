@@ -25,7 +25,7 @@ export type Topic =
 /** Milliseconds between edits of one gesture: more often than light can follow is of no use. */
 const GESTURE = 40;
 
-/** Milliseconds that a refusal is told. */
+/** Milliseconds that a message is told. */
 const READ = 10_000;
 
 const WRAPS = { repeat: RepeatWrapping, mirror: MirroredRepeatWrapping, clamp: ClampToEdgeWrapping } as const;
@@ -94,7 +94,7 @@ export class App {
   /** The gesture of the last edit, and what was refused since it began. */
   private editing: number | undefined;
   private refusal = '';
-  private refusalTimer = 0;
+  private messageTimer = 0;
   /** How lights were dimmed before all of them were turned off. */
   private levels = new Map<number, number>();
 
@@ -129,9 +129,12 @@ export class App {
     topics.forEach((topic) => this.tell(topic));
   }
 
-  /** A line for the person. */
+  /** A line for the person, no longer than it takes to read: what it says may not hold for long. */
   say(message: string): void {
     this.message = message;
+    clearTimeout(this.messageTimer);
+    // What a layer waits for is said as long as it does.
+    if (message && message !== this.resting) this.messageTimer = setTimeout(() => this.say(this.resting), READ);
     this.tell('message');
   }
 
@@ -141,6 +144,8 @@ export class App {
     if (is === this.isConnected) return;
     this.isConnected = is;
     this.isCaughtUp = false;
+    // The server did not hear what waited to be said.
+    if (!is) this.drop();
     if (is) {
       this.say('');
       this.objectsAhead.forget();
@@ -201,9 +206,9 @@ export class App {
         if (notice.question === this.question) this.marks.rays(notice.rays);
         break;
       case 'refused':
-        this.say(notice.message);
         if (notice.code === 'layer') this.rest(notice.message);
-        else this.refused(notice.message);
+        else this.refusal = notice.message;
+        this.say(notice.message);
         // A message that could not be read may have been a change.
         if (notice.code !== 'layer' && notice.code !== 'camera') this.takeBack();
         break;
@@ -286,18 +291,13 @@ export class App {
   /** Light of the layer stays as it is, or follows again. */
   private rest(message: string): void {
     if (message === this.resting) return;
-    if (this.message === this.resting) this.say('');
+    const wasSaid = this.message === this.resting;
     this.resting = message;
+    if (wasSaid) this.say('');
     this.tell('view');
   }
 
-  /** A refusal is told until something else is changed, and not longer than it takes to read. */
-  private refused(message: string): void {
-    this.refusal = message;
-    clearTimeout(this.refusalTimer);
-    this.refusalTimer = setTimeout(() => this.forgive(), READ);
-  }
-
+  /** A refusal is told until something else is changed. */
   private forgive(): void {
     if (this.refusal && this.message === this.refusal) this.say('');
     this.refusal = '';

@@ -43,14 +43,20 @@ function start(): void {
   if (innerWidth < NARROW) fold();
   listen(app, { help, fold });
 
-  app.on('status', () => {
+  const follow = () => {
     const { status } = app;
     if (!status) return;
+    if (!app.isConnected) {
+      doing.textContent = told.textContent = 'The connection was lost; what is seen is from before. Trying again …';
+      return;
+    }
     const left = status.is_done || status.left === null ? '' : ` · about ${duration(status.left)} left`;
     doing.textContent = status.doing + left;
     const milestone = status.is_done ? 'The light is up to date.' : 'The light is being computed.';
     if (told.textContent !== milestone) told.textContent = milestone;
-  });
+  };
+  app.on('status', follow);
+  app.on('connection', follow);
   app.on('message', () => { message.textContent = app.message; });
   app.on('connection', () => {
     veil.hidden = app.isCaughtUp || (app.scene !== null && app.isConnected);

@@ -26,6 +26,10 @@ const TURN = 1.6;
 const DRAG = 0.0042;
 const FREE = 0.0022;
 
+/** How near the ground eyes come that go around a thing, metres; and how many things may lie above each other on it. */
+const GROUND = 0.05;
+const STOREYS = 32;
+
 /** Which way one goes: right, up, back, and turning. */
 export interface Drive {
   right: number;
@@ -55,7 +59,10 @@ export class Navigator {
     this.orbit = new OrbitControls(stage.camera, canvas);
     this.orbit.enableDamping = false;
     this.orbit.enabled = false;
-    this.orbit.addEventListener('change', () => stage.change());
+    this.orbit.addEventListener('change', () => {
+      this.above();
+      stage.change();
+    });
     canvas.addEventListener('pointerdown', (event) => {
       canvas.focus({ preventScroll: true });
       if (this.mode !== 'walk' || this.held || event.button > 1 || document.pointerLockElement) return;
@@ -110,6 +117,7 @@ export class Navigator {
       const hit = this.stage.cast(camera.position, ahead);
       const reach = hit ? hit.distance : Math.max(bounds.getCenter(new Vector3()).sub(camera.position).dot(ahead), 0.1 * this.scale);
       this.orbit.target.copy(camera.position).addScaledVector(ahead, reach);
+      this.above();
       this.orbit.update();
     } else {
       // The head is upright again.
@@ -162,11 +170,35 @@ export class Navigator {
     const radius = from.length() * nearer;
     const polar = Math.acos(Math.max(-1, Math.min(1, from.y / from.length())));
     const angle = Math.atan2(from.x, from.z) + azimuth;
-    const tilt = Math.max(0.02, Math.min(Math.PI - 0.02, polar - elevation));
+    const tilt = Math.max(0.02, Math.min(this.orbit.maxPolarAngle, polar - elevation));
     camera.position.copy(this.orbit.target).add(new Vector3().setFromSphericalCoords(radius, tilt, angle));
     camera.lookAt(this.orbit.target);
     this.orbit.update();
     this.stage.change();
+  }
+
+  /** Around a thing one stays above the ground that it stands on: from below, floors are not seen. */
+  private above(): void {
+    const { target } = this.orbit;
+    const ground = this.ground(target);
+    target.y = Math.max(target.y, ground);
+    const radius = Math.max(this.stage.camera.position.distanceTo(target), 1e-9);
+    const below = Math.min(1, Math.max(0, target.y - ground - GROUND * this.scale) / radius);
+    this.orbit.maxPolarAngle = Math.min(Math.PI - 0.02, 0.5 * Math.PI + Math.asin(below));
+  }
+
+  /** The lowest surface beneath a place that looks up; where there is none, the lowest of all. */
+  private ground(place: Vector3): number {
+    const { bounds } = this.stage;
+    const from = place.clone().setY(place.y + 0.01 * this.scale);
+    let ground = bounds.min.y;
+    for (let storey = 0; storey < STOREYS; storey += 1) {
+      const hit = this.stage.cast(from, new Vector3(0, -1, 0));
+      if (!hit) break;
+      ground = hit.point.y;
+      from.y = ground - 0.01 * this.scale;
+    }
+    return ground;
   }
 
   /** Flies up or down, unless something is there. */

@@ -67,3 +67,10 @@ export function readable(x: number): string {
   const decimals = Math.max(0, Math.min(6, 2 - Math.floor(Math.log10(size))));
   return Number(x.toPrecision(3)).toLocaleString('en', { maximumFractionDigits: decimals, useGrouping: size >= 1e4 });
 }
+
+/** A place along an axis, metres. Far away, as on a map, single precision tells no more than eight digits. */
+export function coordinate(x: number, decimals: number): string {
+  if (Math.abs(x) >= 1e8) return x.toExponential(3);
+  const before = Math.floor(Math.log10(Math.max(1, Math.abs(x)))) + 1;
+  return x.toFixed(Math.max(0, Math.min(decimals, 8 - before)));
+}

@@ -381,6 +381,72 @@ test('two pages see the same, and one that lost its connection catches up', asyn
   await Promise.all([one.context().close(), two.context().close()]);
 });
 
+test('what is said holds: numbers, messages, and that the connection is lost', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const wall = (await state(page)).objects.find(({ name }) => name === 'left');
+  await page.evaluate((id) => window.radiosity.app.select(id), wall.id);
+  const reflectance = page.getByLabel('Mean reflectance, percent');
+  const before = await reflectance.inputValue();
+  // An emptied field is as it was, and nothing is changed.
+  await reflectance.fill('');
+  await reflectance.press('Enter');
+  assert.equal(await reflectance.inputValue(), before);
+  assert.equal((await state(page)).undo, null);
+  // More than a surface of this colour can reflect.
+  await reflectance.fill('150');
+  await reflectance.press('Enter');
+  await done(page, 1);
+  const most = Number(await reflectance.inputValue());
+  const painted = (await state(page)).objects.find(({ id }) => id === wall.id).reflectance;
+  assert.ok(Math.abs(Math.max(...painted) - 0.99) < 1e-3 && most < 99, `${painted} ${most}`);
+  assert.match((await state(page)).message, new RegExp(`${most.toFixed(0)} % is the most`));
+  // It is gone when it was read.
+  await page.waitForFunction(() => window.radiosity.state().message === '', undefined, { timeout: 15_000 });
+  await restored(page);
+  // Far away.
+  const places = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const block = [...app.objects.values()].find(({ name }) => name === 'short block');
+    app.select(block.id);
+    app.objectsAhead.change(block.id, { matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 123456789.123, 54321.9876, 1e30, 1] });
+    app.tell('selection');
+    return [...document.querySelectorAll('.numbers input')].slice(0, 3).map(({ value }) => value);
+  });
+  assert.ok(places.every((text) => text.length < 12 && Number.isFinite(Number(text))), `${places}`);
+  await page.evaluate(() => window.radiosity.app.objectsAhead.takeBack());
+  await page.evaluate(() => {
+    window.WebSocket = class { close() {} };
+    window.radiosity.app.connection.drop();
+  });
+  await page.waitForFunction(() => !window.radiosity.state().isConnected);
+  assert.match(await page.locator('#doing').textContent(), /connection was lost/);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('around a thing one stays above the ground', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const lowest = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.walk('orbit');
+    app.navigator.drive = { right: 0, up: -1, back: 0, yaw: 0, pitch: 0, fast: false };
+    let lowest = Infinity;
+    for (let i = 0; i < 200; i += 1) {
+      // Nearer, too, and away again.
+      app.navigator.drive.back = i < 100 ? -0.5 : 0.5;
+      app.navigator.update(0.05);
+      lowest = Math.min(lowest, app.stage.camera.position.y);
+    }
+    app.navigator.drive.up = 0;
+    return lowest;
+  });
+  assert.ok(lowest >= 0 && lowest < 0.1, `${lowest} m above the floor`);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('malformed messages are refused and nothing is lost', async () => {
   const page = await pages.open(program.url);
   await done(page);

@@ -58,8 +58,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     title: light().type === 'sky' ? 'On open level ground' : 'Across its rays',
     change: () => {
       const { illuminance } = light();
-      if (illuminance && Number.isFinite(lux.valueAsNumber)) app.setLight(light(), { dimming: within(lux.valueAsNumber / luminance(illuminance)) });
-      else app.tell('lights');
+      if (illuminance) app.setLight(light(), { dimming: within(lux.valueAsNumber / luminance(illuminance)) });
     },
   });
   const daylight = el('label', { class: 'row' }, el('span', { class: 'quiet grow' }, light().type === 'sky' ? 'On open ground' : 'Across its rays'), lux, el('span', { class: 'unit' }, 'lx'));

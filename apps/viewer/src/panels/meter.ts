@@ -4,7 +4,7 @@ import { savePoints } from '../files';
 import { open } from '../grid';
 import { luminance } from '../luminance';
 import { lateness } from '../plane';
-import { readable } from '../scale';
+import { coordinate, readable } from '../scale';
 import type { Share } from '../wire';
 import { button, el, fact, hex, isOpen, section } from './parts';
 import { layerName, unitOf } from './view';
@@ -32,7 +32,7 @@ export function meterPanel(app: App): HTMLElement {
       fact('Reflectance', el('span', {}, el('i', { class: 'swatch', style: `background:${hex(answer.reflectance)}` }), `${(100 * luminance(answer.reflectance)).toFixed(1)} %`)),
       fact('Radiosity', `${readable(luminance(answer.radiosity))} lm/m²`),
       fact('Luminance', `${readable(luminance(answer.radiosity) / Math.PI)} cd/m²`),
-      fact('Place', point.toArray().map((x) => x.toFixed(2)).join(', ') + ' m'),
+      fact('Place', `${point.toArray().map((x) => coordinate(x, 2)).join(', ')} m`),
     );
     lights.replaceChildren(...answer.lights.map(bar));
     surfaces.replaceChildren(...answer.surfaces.map(bar));

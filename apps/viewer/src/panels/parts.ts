@@ -29,6 +29,19 @@ export function isOpen(input: HTMLInputElement): boolean {
 addEventListener('input', ({ target }) => { (target as HTMLElement).dataset.open = ''; }, { capture: true });
 for (const end of ['change', 'focusout']) addEventListener(end, ({ target }) => { delete (target as HTMLElement).dataset?.open; }, { capture: true });
 
+// A number that was emptied, or is none, is what it was: nothing is changed by it.
+const numbers = new WeakMap<EventTarget, string>();
+const isNumber = (target: EventTarget | null): target is HTMLInputElement => target instanceof HTMLInputElement && target.type === 'number';
+addEventListener('beforeinput', ({ target }) => {
+  if (isNumber(target) && !isOpen(target)) numbers.set(target, target.value);
+}, { capture: true });
+addEventListener('change', (event) => {
+  const { target } = event;
+  if (!isNumber(target) || Number.isFinite(target.valueAsNumber)) return;
+  target.value = numbers.get(target) ?? '';
+  event.stopImmediatePropagation();
+}, { capture: true });
+
 /** A button; `key` is the key that does the same. */
 export function button(label: string, act: () => void, { key, title, kind = '' }: { key?: string; title?: string; kind?: string } = {}): HTMLButtonElement {
   const help = [title ?? label, key ? `(${key})` : ''].filter(Boolean).join(' ');
@@ -64,7 +77,6 @@ export function slider(
   };
   const give = (input: HTMLInputElement, isLast: boolean) => {
     const value = input.valueAsNumber;
-    if (!Number.isFinite(value)) return;
     act(value, isLast);
     set(value);
   };

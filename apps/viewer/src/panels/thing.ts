@@ -4,6 +4,7 @@ import type { App } from '../app';
 import { turnOf } from '../gizmo';
 import { brighter, LAMPS, type LampKind, remade, solidAngle } from '../lamps';
 import { luminance } from '../luminance';
+import { coordinate } from '../scale';
 import { button, choice, el, hex, isOpen, linear, section } from './parts';
 
 /** As much as a surface may reflect: with 1 in a closed room light would never end. */
@@ -25,11 +26,16 @@ export function thingPanel(app: App): HTMLElement {
   const reflectance = el('input', { type: 'number', min: 0, max: 99, step: 1, 'aria-label': 'Mean reflectance, percent', change: () => rescale() });
   const rescale = () => {
     const object = app.selected === null ? undefined : app.objects.get(app.selected);
-    const wanted = reflectance.valueAsNumber / 100;
-    if (!object || !(wanted >= 0)) return;
+    const wanted = Math.max(0, reflectance.valueAsNumber / 100);
+    if (!object) return;
     const now = luminance(object.reflectance);
     const scaled = now > 1e-4 ? object.reflectance.map((r) => (r * wanted) / now) : [wanted, wanted, wanted];
-    app.paint(object.id, most(scaled));
+    const painted = most(scaled);
+    app.paint(object.id, painted);
+    const reached = luminance(painted);
+    // One of its bands is full before the mean is.
+    if (wanted > reached + 1e-3) app.say(`No surface reflects more than 99 % of any colour: ${(100 * reached).toFixed(0)} % is the most of this one. A paler one can have more.`);
+    show();
   };
   const places = ['X', 'Y', 'Z'].map((axis, k) => el('input', {
     type: 'number', step: 0.05, 'aria-label': `${axis}, metres`, title: `${axis}, metres; the middle of its foot`, change: () => put(k),
@@ -156,7 +162,7 @@ export function thingPanel(app: App): HTMLElement {
     if (!spot) return;
     const at = app.stage.toScene(spot);
     places.forEach((input, k) => {
-      if (!isOpen(input)) input.value = at.getComponent(k).toFixed(3);
+      if (!isOpen(input)) input.value = coordinate(at.getComponent(k), 3);
       // Parallel light has no place.
       input.disabled = light?.position === null;
     });

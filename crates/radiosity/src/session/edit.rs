@@ -141,6 +141,11 @@ pub struct Applied {
     pub traces: bool,
 }
 
+/// A distance as people read it, however far.
+fn far(metres: f64) -> String {
+    if metres < 1e6 { format!("{metres:.1}") } else { format!("{metres:.1e}") }
+}
+
 /// Why an edit was refused. Nothing has changed then.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -185,7 +190,7 @@ pub enum EditError {
     #[error("the matrix has the determinant {0}: it mirrors the object, or makes it too small or too large")]
     Determinant(f64),
     /// The object would be too far away for single precision.
-    #[error("object {} would be {distance:.1} m from the middle of the scene; at most {most:.1} m", object.0)]
+    #[error("object {} would be {} m from the middle of the scene; at most {most:.1} m", object.0, far(*distance))]
     TooFar {
         /// The object.
         object: ObjectId,
