@@ -75,7 +75,7 @@ async function measure() {
 
   /** Makes changes one after the other; the median of milliseconds that each took, and of bytes that came. */
   const changes = async (name, count, edit) => {
-    const [times, sizes] = [[], []];
+    const [times, sizes, own] = [[], [], []];
     for (let i = 0; i < count; i += 1) {
       await until(() => status.is_done);
       const [before, edits, came] = [performance.now(), status.edits, bytes];
@@ -83,9 +83,10 @@ async function measure() {
       await until(() => status.edits > edits && !status.is_following);
       times.push(performance.now() - before);
       sizes.push(bytes - came);
+      own.push(status.latency);
     }
     const median = (list) => list.sort((a, b) => a - b)[Math.floor(list.length / 2)];
-    console.log(`${name}: ${median(times).toFixed(0)} ms (${Math.min(...times).toFixed(0)} to ${Math.max(...times).toFixed(0)}), ${(median(sizes) / 1000).toFixed(0)} kB`);
+    console.log(`${name}: ${median(times).toFixed(0)} ms (${Math.min(...times).toFixed(0)} to ${Math.max(...times).toFixed(0)}), ${median(own).toFixed(0)} of them until it is posted, ${(median(sizes) / 1000).toFixed(0)} kB`);
   };
 
   const light = [...lights.values()].find((light) => !light.deleted);
