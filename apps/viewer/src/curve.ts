@@ -3,7 +3,7 @@ import { ShaderChunk } from 'three';
 
 /** Curves by name, and what people call them. */
 export const CURVES = [
-  ['shoulder', 'Soft shoulder, as `render` has it'], ['linear', 'Linear, clipped'], ['reinhard', 'Reinhard'], ['agx', 'Filmic (AgX)'], ['aces', 'Filmic (ACES)'],
+  ['shoulder', 'Soft shoulder'], ['linear', 'Linear, clipped'], ['reinhard', 'Reinhard'], ['agx', 'Filmic (AgX)'], ['aces', 'Filmic (ACES)'],
 ] as const;
 export type Curve = (typeof CURVES)[number][0];
 

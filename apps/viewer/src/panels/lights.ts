@@ -61,7 +61,9 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
       if (illuminance) app.setLight(light(), { dimming: within(lux.valueAsNumber / luminance(illuminance)) });
     },
   });
-  const daylight = el('label', { class: 'row' }, el('span', { class: 'quiet grow' }, light().type === 'sky' ? 'On open ground' : 'Across its rays'), lux, el('span', { class: 'unit' }, 'lx'));
+  const daylight = el('label', { class: 'slider' },
+    el('span', { class: 'quiet grow' }, light().type === 'sky' ? 'On open ground' : 'Across its rays'),
+    el('span', { class: 'number' }, lux, el('span', { class: 'unit' }, 'lx')));
   const colour = el('input', {
     type: 'color', 'aria-label': `Colour of ${name}, relative to its own`, title: 'Colour, relative to its own; its light in lumens stays',
     input: () => app.setLight(light(), { colour: filter(colour.value) }, during(false)),

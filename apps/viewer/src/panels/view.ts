@@ -30,7 +30,7 @@ export function viewPanel(app: App): HTMLElement {
   look.id = 'colours';
   const exposure = slider('Exposure', { min: -16, max: 8, step: 0.1, unit: 'EV' }, (value) => app.exposure.set(value));
   const curve = el('select', {
-    id: 'curve', 'aria-label': 'Tone curve', title: 'How exposed light becomes what the display shows', change: () => app.setCurve(curve.value as Curve),
+    id: 'curve', 'aria-label': 'Tone curve', title: 'Tone curve: how exposed light becomes what the display shows; the soft shoulder is that of `radiosity render`', change: () => app.setCurve(curve.value as Curve),
   }, ...CURVES.map(([value, text]) => el('option', { value }, text)));
   const automatic = toggle('Automatic exposure', (is) => (is ? app.exposure.automatic() : app.exposure.set(app.exposure.value)), '0');
   const isolines = toggle('Isolines', (is) => app.showIsolines(is), 'I');
@@ -90,6 +90,6 @@ export function viewPanel(app: App): HTMLElement {
     el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Layer'), layer), resting,
     el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Exposure'), exposure),
     automatic,
-    el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Tone curve'), curve), isolines, edges, rays,
+    el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Tones'), curve), isolines, edges, rays,
     el('div', { class: 'row mouse' }, button('Look freely with the mouse', () => app.lookFreely(), { key: 'Y' })));
 }

@@ -277,7 +277,7 @@ impl World {
         for _ in 0..MOST_BACKS {
             let met = self.first(&self.ray(&place, direction, f64::INFINITY), 0)?;
             let id = self.id(Some(met), direction);
-            if !self.body_of_id(id).is_some_and(|body| self.bodies[body].dark() == id) {
+            if self.body_of_id(id).is_none_or(|body| self.bodies[body].dark() != id) {
                 return Some(id);
             }
             place.point += (self.offset + f64::from(met.key)) * direction;
