@@ -1,6 +1,6 @@
 //! The default view factors of whole enclosures: against closed forms and references with blockers, and by the laws.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use radiosity_scene::{Enclosure, Facet};
 use radiosity_trace::sampling::Random;
 use radiosity_transport::view_factors::{ViewFactorOptions, ViewFactors, view_factors};
@@ -35,6 +35,18 @@ fn add_box(enclosure: &mut Enclosure, low: [f64; 3], high: [f64; 3], n: usize, i
                 enclosure.add(format!("{axis}{upper}{k}"), facet(&corners));
             }
         }
+    }
+}
+
+/// The same of a box turned about the vertical through its middle, active outwards.
+fn add_turned_box(enclosure: &mut Enclosure, low: [f64; 3], size: [f64; 3], turn: f64, n: usize) {
+    let mut upright = Enclosure::default();
+    add_box(&mut upright, low, std::array::from_fn(|k| low[k] + size[k]), n, false);
+    let middle = DVec3::from(low) + 0.5 * DVec3::from(size);
+    let turned = DMat3::from_rotation_z(turn);
+    for facet in upright.facets {
+        let corners = facet.corners().iter().map(|c| middle + turned * (*c - middle)).collect();
+        enclosure.add("", Facet::new(corners).unwrap());
     }
 }
 
@@ -237,39 +249,85 @@ fn a_small_shadow_is_not_overlooked() {
     }
 }
 
+/// Six sheets that stand at random and go through one another, active on both sides.
+fn random_sheets(random: &mut Random) -> Enclosure {
+    let mut scene = Enclosure::default();
+    for k in 0..6 {
+        let mut vector = |size: f64| DVec3::from_array(std::array::from_fn(|_| size * random.next_unit()));
+        let centre = vector(1.0);
+        let size = 0.1 + 0.7 * vector(1.0).x.powi(2);
+        let [mut u, mut v] = [(); 2].map(|()| vector(2.0 * size) - DVec3::splat(size));
+        if k % 2 == 0 {
+            (u[k / 2], v[k / 2]) = (0.0, 0.0);
+        }
+        let sheet = Facet::new(vec![centre - u - v, centre + u - v, centre + u + v, centre - u + v]).unwrap();
+        scene.add("front", sheet.clone());
+        scene.add("back", sheet.flipped());
+    }
+    scene
+}
+
+/// How far partly hidden pairs are off, in their stated errors, ascending: by factors a fiftieth as far off.
+fn off_by_stated(scene: &Enclosure, accuracy: f64) -> Vec<f64> {
+    let [found, truth] = [accuracy, 0.02 * accuracy].map(|accuracy| solve(scene, accuracy));
+    let partly = found.entries().filter(|(.., error)| *error > 1e-9);
+    let off = |(i, j, value, error): (usize, usize, f64, f64)| {
+        let truth = truth.factor(i, j);
+        ((value - truth.value * found.areas()[i]).abs() - truth.error * found.areas()[i]).max(0.0) / error
+    };
+    partly.map(off).collect()
+}
+
 /// Sheets that stand at random and go through one another: what is stated as the error holds what is, but for one in
 /// fifty, and those are not far off.
 #[test]
 fn stated_errors_hold_among_random_sheets() {
     let mut random = Random::new(11);
-    let mut ratios: Vec<f64> = Vec::new();
-    for _ in 0..12 {
-        let mut scene = Enclosure::default();
-        for k in 0..6 {
-            let mut vector = |size: f64| DVec3::from_array(std::array::from_fn(|_| size * random.next_unit()));
-            let centre = vector(1.0);
-            let size = 0.1 + 0.7 * vector(1.0).x.powi(2);
-            let [mut u, mut v] = [(); 2].map(|()| vector(2.0 * size) - DVec3::splat(size));
-            if k % 2 == 0 {
-                (u[k / 2], v[k / 2]) = (0.0, 0.0);
-            }
-            let sheet = Facet::new(vec![centre - u - v, centre + u - v, centre + u + v, centre - u + v]).unwrap();
-            scene.add("front", sheet.clone());
-            scene.add("back", sheet.flipped());
-        }
-        let [coarse, fine] = [1e-3, 2e-5].map(|accuracy| solve(&scene, accuracy));
-        for i in 0..scene.facets.len() {
-            for j in 0..i {
-                let (found, truth) = (coarse.factor(i, j), fine.factor(i, j));
-                if found.error > 1e-9 {
-                    ratios.push(((found.value - truth.value).abs() - truth.error).max(0.0) / found.error);
-                }
-            }
+    let mut off: Vec<f64> = (0..12).flat_map(|_| off_by_stated(&random_sheets(&mut random), 1e-3)).collect();
+    off.sort_by(f64::total_cmp);
+    let [at_98, most] = [off[off.len() * 98 / 100], off[off.len() - 1]];
+    assert!(off.len() > 150 && at_98 <= 1.0 && most < 10.0, "{} pairs: {at_98}, {most}", off.len());
+}
+
+/// A room of 5 × 4 × 3 m with a table, two stools, a cupboard and a lamp, some of them turned.
+fn furnished_room() -> Enclosure {
+    let mut room = Enclosure { is_closed: true, ..Enclosure::default() };
+    add_box(&mut room, [0.0; 3], [5.0, 4.0, 3.0], 6, true);
+    add_turned_box(&mut room, [1.5, 1.2, 0.7], [1.6, 0.9, 0.05], 0.2, 2);
+    for [x, y] in [[1.6, 1.2], [2.9, 1.45], [1.5, 1.85], [2.8, 2.1]] {
+        add_turned_box(&mut room, [x, y, 0.001], [0.06, 0.06, 0.69], 0.2, 1);
+    }
+    add_turned_box(&mut room, [1.1, 2.5, 0.1], [0.4, 0.4, 0.35], 0.7, 2);
+    add_turned_box(&mut room, [3.4, 0.8, 0.1], [0.4, 0.4, 0.35], -0.4, 2);
+    add_turned_box(&mut room, [4.2, 1.0, 0.1], [0.6, 2.0, 1.8], 0.0, 3);
+    add_turned_box(&mut room, [2.2, 1.5, 2.2], [0.3, 0.3, 0.3], 0.5, 1);
+    room
+}
+
+/// The same of a hundred scenes of sheets, and of a furnished room; prints how many are off by more than stated.
+#[test]
+#[ignore = "minutes of processor time in a release build"]
+fn stated_errors_hold_in_many_scenes() {
+    let mut random = Random::new(11);
+    let sheets: Vec<Enclosure> = (0..100).map(|_| random_sheets(&mut random)).collect();
+    let room = [furnished_room()];
+    for (name, scenes, accuracies, least) in [
+        ("random sheets", &sheets[..], [1e-2, 1e-3], 2000),
+        ("a furnished room", &room[..], [1e-3, 1e-4], 13_000),
+    ] {
+        for accuracy in accuracies {
+            let off: Vec<f64> = scenes.iter().flat_map(|scene| off_by_stated(scene, accuracy)).collect();
+            let missed = off.iter().filter(|off| **off > 1.0).count();
+            let tenfold = off.iter().filter(|off| **off < 0.1).count();
+            let most = off.iter().copied().fold(0.0, f64::max);
+            println!(
+                "{name}, {accuracy:e} asked: {missed} of {} off by more than stated, at most {most:.1} times; {tenfold} by \
+                 less than a tenth",
+                off.len()
+            );
+            assert!(off.len() > least && 50 * missed <= off.len() && most < 12.0);
         }
     }
-    ratios.sort_by(f64::total_cmp);
-    let [at_98, most] = [ratios[ratios.len() * 98 / 100], ratios[ratios.len() - 1]];
-    assert!(ratios.len() > 150 && at_98 <= 1.0 && most < 10.0, "{} pairs: {at_98}, {most}", ratios.len());
 }
 
 /// What is asked of surfaces holds for them, though they have several facets that take part.
