@@ -279,14 +279,36 @@ fn off_by_stated(scene: &Enclosure, accuracy: f64) -> Vec<f64> {
 }
 
 /// Sheets that stand at random and go through one another: what is stated as the error holds what is, but for one in
-/// fifty, and those are not far off.
+/// a hundred, and those are not far off.
 #[test]
 fn stated_errors_hold_among_random_sheets() {
     let mut random = Random::new(11);
     let mut off: Vec<f64> = (0..12).flat_map(|_| off_by_stated(&random_sheets(&mut random), 1e-3)).collect();
     off.sort_by(f64::total_cmp);
-    let [at_98, most] = [off[off.len() * 98 / 100], off[off.len() - 1]];
-    assert!(off.len() > 150 && at_98 <= 1.0 && most < 10.0, "{} pairs: {at_98}, {most}", off.len());
+    let [at_99, most] = [off[off.len() * 99 / 100], off[off.len() - 1]];
+    assert!(off.len() > 150 && at_99 <= 1.0 && most < 3.0, "{} pairs: {at_99}, {most}", off.len());
+}
+
+/// A sheet that reaches a little through a facet: places at its foot see from before it, not along it, and find that it hides
+/// something.
+#[test]
+fn what_stands_on_a_facet_hides_from_its_foot() {
+    let x = 0.832;
+    let mut scene = Enclosure::default();
+    scene.add("small", facet(&[[x, 0.128, 0.502], [x, 0.040, 0.523], [x, 0.260, 0.701], [x, 0.348, 0.680]]));
+    scene.add(
+        "large",
+        facet(&[[-0.877, -0.672, 0.513], [0.136, 0.420, -0.289], [1.473, 0.909, 0.909], [0.460, -0.183, 1.711]]),
+    );
+    let z = 0.6755;
+    scene.obstructions.push(facet(&[[0.688, 1.004, z], [0.843, 0.212, z], [1.282, -0.185, z], [1.127, 0.607, z]]));
+    let best = solve(&scene, 1e-6).factor(0, 1);
+    assert!(best.value > 0.1 && best.error <= 1e-5, "{best:?}");
+    for accuracy in [1e-2, 1e-3, 1e-4, 1e-5] {
+        let found = solve(&scene, accuracy).factor(0, 1);
+        let off = (found.value - best.value).abs();
+        assert!(off <= found.error + best.error, "{accuracy:e}: off by {off:e}, {found:?}, {best:?}");
+    }
 }
 
 /// A room of 5 × 4 × 3 m with a table, two stools, a cupboard and a lamp, some of them turned.
@@ -311,10 +333,9 @@ fn stated_errors_hold_in_many_scenes() {
     let mut random = Random::new(11);
     let sheets: Vec<Enclosure> = (0..100).map(|_| random_sheets(&mut random)).collect();
     let room = [furnished_room()];
-    for (name, scenes, accuracies, least) in [
-        ("random sheets", &sheets[..], [1e-2, 1e-3], 2000),
-        ("a furnished room", &room[..], [1e-3, 1e-4], 13_000),
-    ] {
+    for (name, scenes, accuracies, least) in
+        [("random sheets", &sheets[..], [1e-2, 1e-3], 2000), ("a furnished room", &room[..], [1e-3, 1e-4], 13_000)]
+    {
         for accuracy in accuracies {
             let off: Vec<f64> = scenes.iter().flat_map(|scene| off_by_stated(scene, accuracy)).collect();
             let missed = off.iter().filter(|off| **off > 1.0).count();
@@ -325,7 +346,7 @@ fn stated_errors_hold_in_many_scenes() {
                  less than a tenth",
                 off.len()
             );
-            assert!(off.len() > least && 50 * missed <= off.len() && most < 12.0);
+            assert!(off.len() > least && 100 * missed <= off.len() && most < 4.0);
         }
     }
 }

@@ -92,6 +92,11 @@ impl Occluder {
         Some(occluder)
     }
 
+    /// Whether a place lies before one of its faces, by more than `touch`.
+    pub fn is_before(&self, place: DVec3, touch: f64) -> bool {
+        self.faces.iter().any(|(beyond, offset)| beyond.dot(place) < offset - touch)
+    }
+
     /// The same without the edges that cut nothing off, whatever place of `region` is looked from; none if it hides nothing
     /// from any. Four points x, p, q, y span a volume that is linear in each, so corners tell of all that is between them.
     pub fn before(mut self, region: &[DVec3], setting: Setting) -> Option<Occluder> {

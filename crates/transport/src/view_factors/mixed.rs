@@ -144,7 +144,10 @@ impl Shaded for View<'_, '_> {
         bodies.dedup();
         let seen = sides.seen(side);
         let varying = bodies.iter().filter(|k| matches!(seen[**k as usize], Seen::Varying));
-        let body = |k: &u16| Some((*k, Occluder::new(self.stage.bodies[*k as usize], *setting, place)?));
+        let body = |k: &u16| {
+            let occluder = Occluder::new(self.stage.bodies[*k as usize], *setting, place)?;
+            occluder.is_before(place, setting.touch).then_some((*k, occluder))
+        };
         let varying: Vec<(u16, Occluder)> = varying.filter_map(body).collect();
         let fixed = bodies.iter().filter_map(|k| match &seen[*k as usize] {
             Seen::As(occluder) => Some((*k, occluder)),

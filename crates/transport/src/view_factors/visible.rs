@@ -73,8 +73,9 @@ pub enum Sight {
 
 impl Shadows {
     /// F from the differential area at `x` with unit `normal` to what is visible of the convex polygon `target`, which
-    /// lies above its horizon and faces it, and to what is hidden, past occluders, each with its number. Those with all faces
-    /// that look at x in planes within `touch` of it hide nothing.
+    /// lies above its horizon and faces it, and to what is hidden, past occluders, each with its number. Where x lies in the
+    /// plane of a face, it is seen as from just before it: from within the face, all beyond is hidden. Edges nearer than
+    /// `touch` cut nothing.
     pub fn sight<'a>(
         &mut self,
         (x, normal): (DVec3, DVec3),
@@ -119,9 +120,9 @@ impl Shadows {
     }
 }
 
-/// Adds the planes of the shadow that an occluder throws as seen from x; whether x lies before it.
+/// Adds the planes of the shadow that an occluder throws as seen from x; whether there is one.
 fn throw(x: DVec3, occluder: &Occluder, touch: f64, planes: &mut Vec<Plane>) -> bool {
-    if !occluder.faces.iter().any(|(beyond, offset)| beyond.dot(x) < offset - touch) {
+    if occluder.faces.is_empty() {
         return false;
     }
     planes.extend_from_slice(&occluder.cuts);
