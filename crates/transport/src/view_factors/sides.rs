@@ -130,7 +130,8 @@ struct Side {
     signs: Signs,
     /// The bodies as seen from there, in their order.
     seen: Vec<Seen>,
-    meetings: Vec<Meeting>,
+    /// Once they are asked for.
+    meetings: Option<Vec<Meeting>>,
 }
 
 /// How polygons in a region of a plane are cut, and what throws shadows on the pieces.
@@ -185,8 +186,9 @@ impl Sides {
         let mut found = SmallVec::new();
         for piece in pieces.drain(..) {
             let number = self.side(&piece, size, bodies, setting);
-            let meetings = &self.sides[number].meetings;
-            let crossing = meetings.iter().filter(|meeting| meeting.crosses(&piece, size));
+            let Side { seen, meetings: of_side, .. } = &mut self.sides[number];
+            let of_side = of_side.get_or_insert_with(|| meetings(&self.region, seen, &self.outline));
+            let crossing = of_side.iter().filter(|meeting| meeting.crosses(&piece, size));
             let planes: SmallVec<[Plane; 16]> = crossing.map(|meeting| meeting.plane).collect();
             parts.push(piece);
             for plane in planes {
@@ -220,8 +222,7 @@ impl Sides {
             None => Seen::Nothing,
         };
         let seen: Vec<Seen> = bodies.iter().enumerate().map(seen).collect();
-        let meetings = meetings(&self.region, &seen, &self.outline);
-        self.sides.push(Side { signs, seen, meetings });
+        self.sides.push(Side { signs, seen, meetings: None });
         self.sides.len() - 1
     }
 }
