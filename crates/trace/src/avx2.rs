@@ -4,7 +4,11 @@
 //! lanes, and boxes only decide what is looked at.
 //!
 //! Tried and left, in a furnished room: nearest box first where any hit will do (14 % slower than in the order they
-//! come), fetching the second box ahead of its turn (3 % slower).
+//! come), fetching the boxes met ahead of their turn (3 % slower, and no faster in a building of a million triangles), boxes
+//! put on the stack by a permutation without branches and in the order of the ray's octant (30 % slower: the processor guesses well),
+//! eight triangles at once in single precision with the exact test for those that pass (no faster), coordinates over directions worked out
+//! once per ray (no faster). Pages of 2 MiB made 4 % more rays a second in that building, and its tree took half as long again to build. Large triangles
+//! split between boxes beforehand made rays in the room visit a tenth fewer nodes, in the building a tenth more.
 
 use crate::Hit;
 use crate::build::MAX_DEPTH;
