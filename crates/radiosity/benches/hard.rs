@@ -208,15 +208,6 @@ fn examine(scene: &Scene, asked: f64) -> Result<(), Failure> {
             })
             .sum();
         let audit = &answer.audit;
-        println!(
-            "  {:.2} stated {:.2} upper {:.2} paths {} rounds {} bias {:.2}",
-            100.0 * (off / square).max(0.0).sqrt(),
-            100.0 * audit.error,
-            100.0 * audit.upper,
-            audit.paths,
-            answer.rounds.len(),
-            100.0 * audit.bias
-        );
         runs.push(Run {
             error: (off / square).max(0.0).sqrt(),
             stated: audit.error,
