@@ -1,8 +1,8 @@
 //! What a row costs on one core: the stages of a solve one by one, in a box like Cornell's, made here: open front, lamp
 //! in the ceiling, two turned blocks, some 11,000 elements.
 //!
-//! Times are per element for exposure and columns, per ray for rows, and per entry of the table for the sweep that the
-//! solver repeats.
+//! Times are per element for exposure and columns, per ray for rows, and per entry of the table and band for the sweep
+//! that the solver repeats.
 
 use criterion::{BatchSize, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
@@ -79,11 +79,14 @@ fn stages(c: &mut Criterion) {
     });
     let mut table = empty();
     table.extend(&tracer, (&ids, &[]), &receivers, RAYS, &()).unwrap();
-    let radiosity: Vec<f64> = (0..3 * n).map(|i| (i % 17) as f64).collect();
-    let mut irradiance = vec![0.0; 3 * n];
-    group.bench_function("sweep over the table, three bands", |b| {
-        b.iter(|| table.apply(&radiosity, &mut irradiance, 3));
-    });
+    for bands in [3, 8, 32] {
+        let radiosity: Vec<f64> = (0..bands * n).map(|i| (i % 17) as f64).collect();
+        let mut irradiance = vec![0.0; bands * n];
+        group.throughput(Throughput::Elements((n * RAYS * bands) as u64));
+        group.bench_function(format!("sweep over the table, {bands} bands"), |b| {
+            b.iter(|| table.apply(&radiosity, &mut irradiance, bands));
+        });
+    }
     group.finish();
 }
 

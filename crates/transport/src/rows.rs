@@ -315,20 +315,50 @@ impl HitTable {
     }
 
     #[inline]
-    fn row(&self, i: usize, values: &[[f32; 4]]) -> [[f32; 4]; 2] {
-        let mut sums = [[0f32; 4]; 2];
+    fn row<const W: usize>(&self, i: usize, values: &[[f32; W]]) -> [[f32; W]; 2] {
+        let mut sums = [[0f32; W]; 2];
+        let add = |sum: &mut [f32; W], id: u32| {
+            for (sum, value) in sum.iter_mut().zip(&values[id as usize]) {
+                *sum += value;
+            }
+        };
         for block in &self.blocks {
             let row = block.row(i);
-            for (sum, ids) in sums.iter_mut().zip(row.chunks_exact(row.len() / 2)) {
-                for &id in ids {
-                    let value = values[id as usize];
-                    for k in 0..4 {
-                        sum[k] += value[k];
-                    }
+            let (first, second) = row.split_at(row.len() / 2);
+            let [a, c] = &mut sums;
+            if W <= 16 {
+                // Both halves in turn, so that neither addition waits for the one before.
+                for (&id, &other) in first.iter().zip(second) {
+                    add(a, id);
+                    add(c, other);
                 }
+            } else {
+                // There are registers for one half.
+                first.iter().for_each(|&id| add(a, id));
+                second.iter().for_each(|&id| add(c, id));
             }
         }
         sums
+    }
+
+    /// F b among the elements for up to W bands from `first` on; returns how many.
+    fn sweep<const W: usize>(&self, b: &[f64], h: &mut [f64], bands: usize, first: usize) -> usize {
+        let n = self.space.area.len();
+        let count = (bands - first).min(W);
+        let mut values = vec![[0f32; W]; self.all_ids];
+        values.par_iter_mut().zip(b.par_chunks_exact(bands)).with_min_len(4096).for_each(|(value, b)| {
+            for (value, b) in value.iter_mut().zip(&b[first..first + count]) {
+                *value = *b as f32;
+            }
+        });
+        h.par_chunks_exact_mut(bands).with_min_len(256).enumerate().take(n).for_each(|(i, h)| {
+            let share = 1.0 / f64::from(self.traced[i].max(1));
+            let [a, c] = self.row(i, &values);
+            for (k, h) in h[first..first + count].iter_mut().enumerate() {
+                *h = (f64::from(a[k]) + f64::from(c[k])) * share;
+            }
+        });
+        count
     }
 
     /// The rows among elements as a stored matrix, for solvers that need more than to apply it.
@@ -388,24 +418,17 @@ impl Transport for HitTable {
         Some(&self.parts)
     }
 
-    /// F b among the elements; sky and nothing give zero here. Bands beyond four are taken four at a time.
+    /// F b among the elements; sky and nothing give zero here. An entry of the table is read once for up to 32 bands: many right-hand
+    /// sides at once, such as columns of lights, are bands of one field.
     fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
-        let n = self.space.area.len();
-        let mut values = vec![[0f32; 4]; self.all_ids];
-        for first in (0..bands).step_by(4) {
-            let count = (bands - first).min(4);
-            for (value, b) in values.iter_mut().zip(b.chunks_exact(bands)) {
-                for k in 0..count {
-                    value[k] = b[first + k] as f32;
-                }
-            }
-            h.par_chunks_exact_mut(bands).with_min_len(256).enumerate().take(n).for_each(|(i, h)| {
-                let share = 1.0 / f64::from(self.traced[i].max(1));
-                let [a, c] = self.row(i, &values);
-                for k in 0..count {
-                    h[first + k] = (f64::from(a[k]) + f64::from(c[k])) * share;
-                }
-            });
+        let mut first = 0;
+        while first < bands {
+            first += match bands - first {
+                ..=4 => self.sweep::<4>(b, h, bands, first),
+                5..=8 => self.sweep::<8>(b, h, bands, first),
+                9..=16 => self.sweep::<16>(b, h, bands, first),
+                _ => self.sweep::<32>(b, h, bands, first),
+            };
         }
     }
 }
