@@ -3,149 +3,25 @@
 //! The unknown is X = B − P, the radiosity without the part P that [`Luminaires`] carry to every receiver directly:
 //! X = (E − P) + R (D + S + F X), with D the direct irradiance and S the sky's, both known before the solve.
 
+mod balance;
+mod options;
+
+pub use balance::Balance;
+pub use options::SolveOptions;
+pub(crate) use options::element_size;
+
 use crate::Error;
-use crate::displayed::{Displayed, Screen, Shown};
+use crate::displayed::{Screen, Shown};
 use crate::division::{Optics, Sheets, divided};
-use crate::equation::{self, Matrix, RANDOM_TOLERANCE, TABLE_TOLERANCE, Task, single};
+use crate::equation::{self, Matrix, Task, single};
 use crate::monitor::{Hurry, Monitor, Stages, Watch, is_over};
-use radiosity_scene::{Bands, Elements, Scene, SkyPatches};
-use radiosity_solve::{DiffuseResponse, Info, Params, Solver};
+use radiosity_scene::{Bands, Elements, SkyPatches};
+use radiosity_solve::{DiffuseResponse, Info};
 use radiosity_trace::Tracer;
-use radiosity_transport::{
-    Columns, ElementReceivers, Exposure, FormFactorMethod, Gather, HitTable, IdSpace, Luminaires, Shadowing,
-};
-use rayon::prelude::*;
-use serde::Serialize;
-
-/// How to solve.
-#[derive(Clone, Copy, Debug)]
-pub struct SolveOptions {
-    /// Width of a cell, metres: of an element, where direct light is even. `None` chooses it by `cells`.
-    pub element_size: Option<f64>,
-    /// Whether what comes of it is only looked up, by a gather: triangles much smaller than cells get their share of the
-    /// rays then, as the noise of many averages out.
-    pub looked_up: bool,
-    /// How many cells to aim for on top of one per triangle. At ten thousand the walls of a room are cut into cells of
-    /// some 15 cm, and their light varies by a few percent from cell to cell.
-    pub cells: usize,
-    /// How much direct light may vary within elements: the flux that leaves them by their standard deviation, relative
-    /// to that of their direct light.
-    pub variation: f64,
-    /// M: rays per cell.
-    pub rays: usize,
-    /// Shadow rays per cell. Their noise averages out over the elements that a receiver sees.
-    pub shadowing: Shadowing,
-    /// How light between elements is found: by the table of hit ids where there is none, else by one of the methods for
-    /// form factors, whose matrix grows with the square of the elements. Light of lamps and sky is found the same way in
-    /// either case.
-    pub form_factors: Option<FormFactorMethod>,
-    /// The solver.
-    pub solver: Solver,
-    /// When it stops. Random solvers are better asked for [`RANDOM_TOLERANCE`](crate::RANDOM_TOLERANCE): see
-    /// [`SolveOptions::of`].
-    pub params: Params,
-    /// Stops when what is displayed is near enough, whatever the residual.
-    pub displayed: Option<Displayed>,
-    /// Largest size of the table of hit ids, bytes.
-    pub memory: usize,
-}
-
-impl Default for SolveOptions {
-    fn default() -> Self {
-        SolveOptions {
-            element_size: None,
-            looked_up: false,
-            cells: 10_000,
-            variation: 0.05,
-            rays: 64,
-            shadowing: Shadowing { places: 8, rays: 2 },
-            form_factors: None,
-            solver: Solver::DeflatedJacobi,
-            params: Params { tolerance: 1e-4, ..Params::default() },
-            displayed: None,
-            memory: 4 << 30,
-        }
-    }
-}
-
-/// Rays per cell below which an answer is of no use.
-const LEAST_RAYS: usize = 32;
-
-/// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
-const MATRIX_CELLS: usize = 2000;
+use radiosity_transport::{Columns, ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires};
 
 /// Rays per cell that are traced whether or not there is time: a tenth of a second for a room.
 const FIRST_RAYS: usize = 16;
-
-impl SolveOptions {
-    /// The default with a solver, and the residual that it is good for.
-    pub fn of(solver: Solver) -> SolveOptions {
-        let mut options = SolveOptions { solver, ..SolveOptions::default() };
-        if solver.is_random() {
-            options.params.tolerance = RANDOM_TOLERANCE;
-        }
-        options
-    }
-
-    /// Fewer cells, and none of them divided, where a matrix grows with the square of the elements.
-    pub(crate) fn suit_method(&mut self) {
-        if self.form_factors.is_some() || self.solver.is_direct() {
-            (self.cells, self.variation) = (self.cells.min(MATRIX_CELLS), f64::INFINITY);
-        }
-    }
-
-    /// Refuses a solver that has no right to sheets, or to the factors of the method: only the adaptive one stores a pair
-    /// once for both directions.
-    fn refuse_unfit_solver(&self, scene: &Scene) -> Result<(), Error> {
-        if scene.transmits() && !self.solver.takes_sheets() {
-            return Err(Error::Transmission { solver: self.solver });
-        }
-        if !self.solver.needs_reciprocity() || self.form_factors == Some(FormFactorMethod::Adaptive) {
-            return Ok(());
-        }
-        let method = self.form_factors.map_or("rays", FormFactorMethod::name);
-        Err(Error::Reciprocity { solver: self.solver, method })
-    }
-
-    /// Refuses a residual that single precision does not tell, before the work.
-    fn refuse_beyond_single_precision(&self) -> Result<(), Error> {
-        let is_applied = self.form_factors.is_none() && self.solver.applies_only() && self.displayed.is_none();
-        let (asked, least) = (self.params.tolerance, TABLE_TOLERANCE);
-        if is_applied && asked < least { Err(Error::Tolerance { asked, least }) } else { Ok(()) }
-    }
-
-    /// Refuses elimination of so many elements that its matrices are beyond the memory.
-    fn refuse_large_matrices(&self, elements: usize) -> Result<(), Error> {
-        let (solver, needed, allowed) = (self.solver, self.solver.matrix_bytes(elements), self.memory);
-        if needed > allowed { Err(Error::Elimination { solver, elements, needed, allowed }) } else { Ok(()) }
-    }
-
-    /// Fewer rays where the memory does not hold those that are asked for: an error that is missed tells more than none.
-    pub(crate) fn fit(&mut self, tracer: &Tracer) {
-        while self.rays > LEAST_RAYS && Solution::memory(tracer, self) > self.memory {
-            self.rays /= 2;
-        }
-    }
-}
-
-/// Where the light goes, in lumens (or watts) per band.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Balance {
-    /// Emitted by surfaces.
-    pub emitted: Bands,
-    /// Received from lights without area.
-    pub from_point_lights: Bands,
-    /// Received from the sky.
-    pub from_sky: Bands,
-    /// Absorbed by surfaces.
-    pub absorbed: Bands,
-    /// Escaped from the scene.
-    pub escaped: Bands,
-    /// Absorbed by the black backs of one-sided surfaces.
-    pub lost_on_backs: Bands,
-    /// (in − out)/in, before any repair.
-    pub defect: [f64; 3],
-}
 
 /// A solved scene.
 pub struct Solution<'a> {
@@ -566,69 +442,9 @@ impl<'a> Solution<'a> {
         let ones = vec![[1f32; 4]; self.values.len()];
         self.table.rows_mean(&ones).iter().fold(0f64, |worst, sum| worst.max((f64::from(sum[0]) - 1.0).abs()))
     }
-
-    /// Where the light goes, from the rows as they are.
-    pub fn balance(&self) -> Balance {
-        let n = self.elements.len();
-        let (first_sky, nothing) = (n as u32, (self.values.len() - 1) as u32);
-        let radiosity = self.radiosity();
-        let mut sums = [[0f64; 3]; 6];
-        // A surface gives and takes as far as it is there.
-        let (scene, mesh) = (self.tracer.scene, self.tracer.mesh);
-        let there = |(e, area): (usize, f64)| area * f64::from(self.elements.opacity(scene, mesh, e as u32));
-        let weight: Vec<f64> = self.exposed_area().into_iter().enumerate().map(there).collect();
-        for (i, w) in weight.iter().enumerate() {
-            for (light, e) in self.luminaires.lights.iter().zip(self.columns.seen_by_light(i)) {
-                if matches!(light, radiosity_transport::Light::Point(_)) {
-                    (0..3).for_each(|band| sums[1][band] += w * f64::from(e[band]));
-                }
-            }
-        }
-        let shares: Vec<[f64; 2]> = (0..n)
-            .into_par_iter()
-            .map(|i| {
-                let (mut sky, mut back, mut m) = (0u32, 0u32, 0.0);
-                for id in self.table.row_ids(i) {
-                    m += 1.0;
-                    back += u32::from(id == nothing);
-                    sky += u32::from(id >= first_sky && id != nothing);
-                }
-                [f64::from(sky) / m, f64::from(back) / m]
-            })
-            .collect();
-        let from_sky = self.daylight();
-        for i in 0..n {
-            for band in 0..3 {
-                let (rho, e) = (f64::from(self.reflectance[i][band]), f64::from(self.irradiance[i][band]));
-                let b = f64::from(radiosity[i][band]);
-                sums[0][band] += weight[i] * f64::from(self.exitance[i][band]);
-                sums[2][band] += weight[i] * f64::from(from_sky[i][band]);
-                sums[3][band] += weight[i] * (1.0 - rho) * e;
-                if let Some((other, tau)) = self.sheets.passed(i) {
-                    // Not absorbed on the other side: it leaves this one.
-                    sums[3][band] -= weight[i] * f64::from(tau[band]) * f64::from(self.irradiance[other][band]);
-                }
-                sums[4][band] += weight[i] * b * shares[i][0];
-                sums[5][band] += weight[i] * b * shares[i][1];
-            }
-        }
-        let defect = std::array::from_fn(|band| {
-            let input = sums[0][band] + sums[1][band] + sums[2][band];
-            let output = sums[3][band] + sums[4][band] + sums[5][band];
-            if input > 0.0 { (input - output) / input } else { 0.0 }
-        });
-        let [emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs] =
-            sums.map(|s| s.map(|x| x as f32));
-        Balance { emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs, defect }
-    }
 }
 
 /// What an answer would need that the options do not allow.
 fn memory_error(elements: usize, needed: usize, options: &SolveOptions) -> Error {
     Error::Memory { elements, rays: options.rays, needed, allowed: options.memory }
-}
-
-/// Width of a cell: as asked, or such that the scene's area makes as many as asked.
-pub(crate) fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
-    options.element_size.unwrap_or_else(|| (2.0 * tracer.mesh.whole_area() / options.cells.max(1) as f64).sqrt())
 }

@@ -1,0 +1,123 @@
+//! How to solve: what is asked for, what it may take, and which methods go together.
+
+use super::Solution;
+use crate::Error;
+use crate::displayed::Displayed;
+use crate::equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
+use radiosity_scene::Scene;
+use radiosity_solve::{Params, Solver};
+use radiosity_trace::Tracer;
+use radiosity_transport::{FormFactorMethod, Shadowing};
+
+/// How to solve.
+#[derive(Clone, Copy, Debug)]
+pub struct SolveOptions {
+    /// Width of a cell, metres: of an element, where direct light is even. `None` chooses it by `cells`.
+    pub element_size: Option<f64>,
+    /// Whether what comes of it is only looked up, by a gather: triangles much smaller than cells get their share of the
+    /// rays then, as the noise of many averages out.
+    pub looked_up: bool,
+    /// How many cells to aim for on top of one per triangle. At ten thousand the walls of a room are cut into cells of
+    /// some 15 cm, and their light varies by a few percent from cell to cell.
+    pub cells: usize,
+    /// How much direct light may vary within elements: the flux that leaves them by their standard deviation, relative
+    /// to that of their direct light.
+    pub variation: f64,
+    /// M: rays per cell.
+    pub rays: usize,
+    /// Shadow rays per cell. Their noise averages out over the elements that a receiver sees.
+    pub shadowing: Shadowing,
+    /// How light between elements is found: by the table of hit ids where there is none, else by one of the methods for
+    /// form factors, whose matrix grows with the square of the elements. Light of lamps and sky is found the same way in
+    /// either case.
+    pub form_factors: Option<FormFactorMethod>,
+    /// The solver.
+    pub solver: Solver,
+    /// When it stops. Random solvers are better asked for [`RANDOM_TOLERANCE`](crate::RANDOM_TOLERANCE): see
+    /// [`SolveOptions::of`].
+    pub params: Params,
+    /// Stops when what is displayed is near enough, whatever the residual.
+    pub displayed: Option<Displayed>,
+    /// Largest size of the table of hit ids, bytes.
+    pub memory: usize,
+}
+
+impl Default for SolveOptions {
+    fn default() -> Self {
+        SolveOptions {
+            element_size: None,
+            looked_up: false,
+            cells: 10_000,
+            variation: 0.05,
+            rays: 64,
+            shadowing: Shadowing { places: 8, rays: 2 },
+            form_factors: None,
+            solver: Solver::DeflatedJacobi,
+            params: Params { tolerance: 1e-4, ..Params::default() },
+            displayed: None,
+            memory: 4 << 30,
+        }
+    }
+}
+
+/// Rays per cell below which an answer is of no use.
+const LEAST_RAYS: usize = 32;
+
+/// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
+const MATRIX_CELLS: usize = 2000;
+
+impl SolveOptions {
+    /// The default with a solver, and the residual that it is good for.
+    pub fn of(solver: Solver) -> SolveOptions {
+        let mut options = SolveOptions { solver, ..SolveOptions::default() };
+        if solver.is_random() {
+            options.params.tolerance = RANDOM_TOLERANCE;
+        }
+        options
+    }
+
+    /// Fewer cells, and none of them divided, where a matrix grows with the square of the elements.
+    pub(crate) fn suit_method(&mut self) {
+        if self.form_factors.is_some() || self.solver.is_direct() {
+            (self.cells, self.variation) = (self.cells.min(MATRIX_CELLS), f64::INFINITY);
+        }
+    }
+
+    /// Refuses a solver that has no right to sheets, or to the factors of the method: only the adaptive one stores a pair
+    /// once for both directions.
+    pub(super) fn refuse_unfit_solver(&self, scene: &Scene) -> Result<(), Error> {
+        if scene.transmits() && !self.solver.takes_sheets() {
+            return Err(Error::Transmission { solver: self.solver });
+        }
+        if !self.solver.needs_reciprocity() || self.form_factors == Some(FormFactorMethod::Adaptive) {
+            return Ok(());
+        }
+        let method = self.form_factors.map_or("rays", FormFactorMethod::name);
+        Err(Error::Reciprocity { solver: self.solver, method })
+    }
+
+    /// Refuses a residual that single precision does not tell, before the work.
+    pub(super) fn refuse_beyond_single_precision(&self) -> Result<(), Error> {
+        let is_applied = self.form_factors.is_none() && self.solver.applies_only() && self.displayed.is_none();
+        let (asked, least) = (self.params.tolerance, TABLE_TOLERANCE);
+        if is_applied && asked < least { Err(Error::Tolerance { asked, least }) } else { Ok(()) }
+    }
+
+    /// Refuses elimination of so many elements that its matrices are beyond the memory.
+    pub(super) fn refuse_large_matrices(&self, elements: usize) -> Result<(), Error> {
+        let (solver, needed, allowed) = (self.solver, self.solver.matrix_bytes(elements), self.memory);
+        if needed > allowed { Err(Error::Elimination { solver, elements, needed, allowed }) } else { Ok(()) }
+    }
+
+    /// Fewer rays where the memory does not hold those that are asked for: an error that is missed tells more than none.
+    pub(crate) fn fit(&mut self, tracer: &Tracer) {
+        while self.rays > LEAST_RAYS && Solution::memory(tracer, self) > self.memory {
+            self.rays /= 2;
+        }
+    }
+}
+
+/// Width of a cell: as asked, or such that the scene's area makes as many as asked.
+pub(crate) fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
+    options.element_size.unwrap_or_else(|| (2.0 * tracer.mesh.whole_area() / options.cells.max(1) as f64).sqrt())
+}
