@@ -1,6 +1,6 @@
 //! Surfaces that see nothing: rows of a matrix of factors that are all zero, and why they are.
 
-use radiosity::transport::FormFactors;
+use radiosity::transport::{FormFactorMethod, FormFactors};
 use radiosity::{Enclosure, Facet};
 
 /// Height above a plane that counts as none, relative to the extent of the scene: below what single precision leaves of
@@ -14,18 +14,21 @@ pub enum Why {
     Alone,
     /// There is, but all of it is hidden: the surface is covered or walled in.
     Hidden,
+    /// There is, but the method met none of it: it may be hidden, or too small for where the method looked.
+    Unmet,
 }
 
 impl Why {
-    /// Why surface `blind` sees nothing: facets before each other that it yet sees nothing of are hidden.
-    pub fn of(enclosure: &Enclosure, blind: usize) -> Why {
+    /// Why surface `blind` sees nothing by a method: facets before each other that it yet sees nothing of are hidden, where the
+    /// method proves it. Others look at samples.
+    pub fn of(enclosure: &Enclosure, method: FormFactorMethod, blind: usize) -> Why {
         let facets = || enclosure.facets.iter().zip(&enclosure.surface_of);
         let size = enclosure.bounds().map_or(0.0, |[low, high]| low.distance(high));
         let faces = |from: &Facet, to: &Facet| to.corners().iter().any(|corner| from.height(*corner) > FLAT * size);
         let own = facets().filter(|(_, surface)| **surface as usize == blind);
         for (facet, _) in own {
             if facets().any(|(other, _)| faces(facet, other) && faces(other, facet)) {
-                return Why::Hidden;
+                return if method == FormFactorMethod::Adaptive { Why::Hidden } else { Why::Unmet };
             }
         }
         Why::Alone
@@ -36,6 +39,7 @@ impl Why {
         match self {
             Why::Alone => "none faces it",
             Why::Hidden => "covered or walled in",
+            Why::Unmet => "nothing was met",
         }
     }
 }

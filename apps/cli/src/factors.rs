@@ -9,7 +9,7 @@ use radiosity::io::vs3::NoRow;
 use radiosity::io::{FactorFormat, FactorRows, FactorTable, Grouping, LoadOptions, Vs3, enclosure_of, load_enclosure};
 use radiosity::transport::row::{MOST_CELLS, RowMethod};
 use radiosity::transport::{FormFactorMethod, FormFactors};
-use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Missed, Severity, counted};
+use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Severity, counted};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -451,17 +451,12 @@ fn rows_of_vs3(vs3: &Vs3, enclosure: &Enclosure, is_script_f: bool) -> Vec<Strin
     lines
 }
 
-/// What was asked and not reached, if surfaces as they go out are not as exact either.
-fn missed(found: &Factors) -> Option<Missed> {
-    found.missed.filter(|missed| found.largest_error.error > missed.asked)
-}
-
 /// What is doubtful about factors: worth a warning, whatever goes out.
 fn warnings(input: &Input, found: &Factors) -> Vec<String> {
     let name = |surface| name(&input.enclosure, surface);
     let mut lines = Vec::new();
     // Of surfaces that go out as exact as was asked, no more is told; else this is the one place where their error is.
-    if let Some(missed) = missed(found) {
+    if let Some(missed) = &found.missed {
         lines.push(format!(
             "warning: the accuracy of {:e} was not reached between {} (cut large surfaces into pieces, or allow more): {}",
             missed.asked,
@@ -515,7 +510,7 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
         sums += &format!("; off from one by {:.1e} (RMS), the most at {worst}", closure.rms);
     }
     lines.push(sums);
-    lines.extend(blind_rows(enclosure, found));
+    lines.extend(blind_rows(enclosure, arguments.method, found));
     if arguments.method == FormFactorMethod::Adaptive {
         lines.push("reciprocal by storage".to_owned());
     } else {
@@ -524,7 +519,7 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
             lines.push(format!("{} does not see what stands between surfaces", arguments.method));
         }
     }
-    if missed(found).is_none() {
+    if found.missed.is_none() {
         lines.push(largest_error(enclosure, found));
     }
     if let Some(repair) = &found.repair {
@@ -551,12 +546,13 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
 }
 
 /// Which rows are all zero, and why.
-fn blind_rows(enclosure: &Enclosure, found: &Factors) -> Option<String> {
+fn blind_rows(enclosure: &Enclosure, method: FormFactorMethod, found: &Factors) -> Option<String> {
     let blind = blind(&found.factors);
     if blind.is_empty() {
         return None;
     }
-    let told = |surface: &usize| format!("{} ({})", name(enclosure, *surface), Why::of(enclosure, *surface).told());
+    let told =
+        |surface: &usize| format!("{} ({})", name(enclosure, *surface), Why::of(enclosure, method, *surface).told());
     let first: Vec<String> = blind.iter().take(LISTED).map(told).collect();
     let more = blind.len() - first.len();
     let rows = counted(blind.len(), "row is all zero: its surface sees", "rows are all zero: their surfaces see");
@@ -596,9 +592,7 @@ fn event(
         "closure": found.closure, "row_sums": found.row_sums, "reciprocity": found.reciprocity,
         "zero_rows": blind(&found.factors).into_iter().map(named).collect::<Vec<_>>(),
         "largest_error": { "error": found.largest_error.error, "pair": found.largest_error.pair.map(named) },
-        "accuracy_missed": found.missed.map(|m| json!({
-            "asked": m.asked, "pairs_missed": m.pairs, "largest": m.largest.error, "pair": m.largest.pair.map(named),
-        })),
+        "accuracy_missed": found.missed.map(|m| json!({ "asked": m.asked, "facet_pairs": m.pairs })),
         "excess": found.excess.map(|e| json!({ "rows": e.rows, "row": named(e.row), "sum": e.sum, "errors": e.errors })),
         "repair": found.repair, "choices": found.factors.choices, "stages": progress.spent(),
         "seconds": progress.seconds(), "output": arguments.output, "factors": rows,

@@ -35,7 +35,8 @@ pub struct Factors {
     pub reciprocity: f64,
     /// The factor with the largest stated error.
     pub largest_error: Doubt,
-    /// Pairs of facets that are not as exact as was asked; of the adaptive method alone, which is asked.
+    /// What was asked and not reached, where [`Factors::largest_error`] is more than that; of the adaptive method alone, which
+    /// is asked.
     pub missed: Option<Missed>,
     /// Rows that sum to more than one by more than their errors allow: there surfaces overlap, or errors are too small.
     pub excess: Option<Excess>,
@@ -54,13 +55,11 @@ pub struct Doubt {
     pub pair: [usize; 2],
 }
 
-/// What was asked and not reached.
+/// An accuracy that was not reached.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Missed {
-    /// Pairs of facets whose stated error is larger than asked.
+    /// Pairs of facets whose stated error, of the factor from the smaller one, is larger than asked.
     pub pairs: usize,
-    /// The largest of them, as an error of the factor from the smaller facet, and the surfaces that the facets belong to.
-    pub largest: Doubt,
     /// What was asked.
     pub asked: f64,
 }
@@ -82,20 +81,12 @@ pub struct Excess {
 const ROUNDING: f64 = 1e-9;
 
 impl Missed {
-    fn of(found: &ViewFactors, enclosure: &Enclosure, asked: f64) -> Option<Missed> {
-        let (areas, surface) = (found.areas(), |facet: usize| enclosure.surface_of[facet] as usize);
+    fn of(found: &ViewFactors, asked: f64) -> Option<Missed> {
+        let areas = found.areas();
         // Errors are stored in single precision, rounded up.
         let bound = asked * (1.0 + 4.0 * f64::from(f32::EPSILON));
-        let (mut pairs, mut largest) = (0, Doubt::default());
-        for (i, j, _, error) in found.entries() {
-            let (small, large) = if areas[i] <= areas[j] { (i, j) } else { (j, i) };
-            let error = error / areas[small];
-            pairs += usize::from(error > bound);
-            if error > largest.error {
-                largest = Doubt { error, pair: [surface(small), surface(large)] };
-            }
-        }
-        (pairs > 0).then_some(Missed { pairs, largest, asked })
+        let pairs = found.entries().filter(|(i, j, _, error)| error / areas[*i].min(areas[*j]) > bound).count();
+        (pairs > 0).then_some(Missed { pairs, asked })
     }
 }
 
@@ -154,14 +145,19 @@ pub fn factors(enclosure: &Enclosure, options: &FactorsOptions, monitor: &dyn Mo
         return Ok(Factors::of(found, reciprocity, stages));
     }
     let found = stages.time(monitor, "form factors", || view_factors(enclosure, &options.form.adaptive, &watch))?;
-    let missed = Missed::of(&found, enclosure, options.form.adaptive.accuracy);
+    let missed = Missed::of(&found, options.form.adaptive.accuracy);
     let mut found: ViewFactors =
         if enclosure.surfaces.len() == enclosure.facets.len() { found } else { found.by_surface(enclosure) };
-    // Stored once for both directions.
+    let raw = |found: ViewFactors| {
+        // Stored once for both directions.
+        let raw = Factors::of(found.into(), 0.0, stages);
+        // Of surfaces that are as exact as was asked nobody need know which facets are not.
+        Factors { missed: missed.filter(|missed| raw.largest_error.error > missed.asked), ..raw }
+    };
     if !options.close {
-        return Ok(Factors { missed, ..Factors::of(found.into(), 0.0, stages) });
+        return Ok(raw(found));
     }
-    let raw = Factors { missed, ..Factors::of(found.clone().into(), 0.0, stages) };
+    let raw = raw(found.clone());
     let repair = raw.stages.time(monitor, "closing", || found.repair());
     Ok(Factors { factors: found.into(), repair: Some(repair), ..raw })
 }
@@ -225,9 +221,10 @@ mod tests {
         let reached = with_accuracy(1e-4);
         assert_eq!(reached.missed, None, "{:?}", reached.largest_error);
         assert!(reached.largest_error.error > 0.0 && reached.largest_error.error < 1.001e-4);
-        let missed = with_accuracy(1e-30).missed.expect("no sum of doubles is as exact");
-        assert_eq!((missed.pairs, missed.asked), (1, 1e-30));
-        assert!(missed.largest.error > 1e-30 && missed.largest.pair[0] + missed.largest.pair[1] == 1, "{missed:?}");
+        let off = with_accuracy(1e-30);
+        assert_eq!(off.missed, Some(Missed { pairs: 1, asked: 1e-30 }), "no sum of doubles is as exact");
+        let Doubt { error, pair } = off.largest_error;
+        assert!(error > 1e-30 && pair[0] + pair[1] == 1, "{off:?}");
     }
 
     /// Two floors in one place, each seen whole.
