@@ -95,6 +95,8 @@ export class App {
   private editing: number | undefined;
   private refusal = '';
   private messageTimer = 0;
+  /** Moves of things up to which it is known what covers the grid. */
+  private gridMoves = 0;
   /** How lights were dimmed before all of them were turned off. */
   private levels = new Map<number, number>();
 
@@ -795,8 +797,6 @@ export class App {
   }
 
   /** The grid where its surface is now, in the light of now. */
-  private gridMoves = 0;
-
   private readGrid(): void {
     if (this.grid && this.gridMoves !== this.stage.moves) {
       this.gridMoves = this.stage.moves;
@@ -804,7 +804,7 @@ export class App {
     }
     if (this.grid && open(this.grid).length === 0) {
       this.say('All points of the grid lie beneath things.');
-      this.grid = null;
+      return this.clearGrid();
     }
     if (this.grid) read(this.grid);
     this.marks.grid(this.grid);

@@ -25,7 +25,9 @@ export function cover(app: App, grid: Grid, picked: Vector3): void {
   const things = new Map<number, Thing>();
   for (const surface of stage.surfaces.values()) {
     if (!surface.visible) continue;
-    const { group } = app.objects.get(surface.object)!;
+    // What has just been added is there before its name is.
+    const group = app.objects.get(surface.object)?.group;
+    if (group === undefined) continue;
     const thing = things.get(group) ?? { surfaces: [], box: new Box3() };
     thing.surfaces.push(surface);
     thing.box.union(stage.box(surface));

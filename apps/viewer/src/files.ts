@@ -11,10 +11,11 @@ export function savePoints(app: App): void {
   const up = normal?.toArray() ?? [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
   const row = ({ point, lux }: ReturnType<typeof measured>[number]) =>
     [...stage.toScene(point).toArray().map((x) => x.toFixed(5)), ...up.map((x) => x.toFixed(6)), lux.toPrecision(6)].join(',');
-  const column = grid && app.layer === 'relative_error' ? 'relative_error_percent' : 'illuminance_lux';
+  const read = grid && app.layer;
+  const column = read === 'relative_error' ? 'relative_error_percent' : read === 'error' ? 'standard_error_lux' : 'illuminance_lux';
   const rows = [`x,y,z,nx,ny,nz,${column}`, ...measured(app).map(row), ''];
   save(app, new Blob([rows.join('\n')], { type: 'text/csv' }), plane ? 'plane.csv' : 'grid.csv');
-  app.say(`Points saved: place, normal, ${column}.`);
+  app.say('Points saved, each with its place and normal.');
 }
 
 /** Hands a file to the person, named after the scene. */

@@ -177,7 +177,7 @@ export class Navigator {
     this.stage.change();
   }
 
-  /** Around a thing one stays above the ground that it stands on: from below, floors are not seen. */
+  /** Around a thing one stays above the lowest floor beneath it: from below, floors are not seen. */
   private above(): void {
     const { target } = this.orbit;
     const ground = this.ground(target);

@@ -125,13 +125,11 @@ test('points of a grid beneath things are left out and counted', async () => {
   assert.match(await page.locator('#grid .facts').textContent(), new RegExp(`Points${laid.count - laid.covered}Covered, left out${laid.covered}`));
   // A mat of 3 mm where there is nothing, and away again.
   const { edits } = (await state(page)).status;
-  const matted = await page.evaluate(() => {
+  await page.evaluate(() => {
     const { app } = window.radiosity;
     const block = [...app.objects.values()].find(({ name }) => name === 'short block');
     app.edit({ copy: { object: block.id, matrix: [1, 0, 0, 0, 0, 0.02, 0, 0, 0, 0, 1, 0, 0.2, 0, -0.02, 1] } });
-    return block.id;
   });
-  assert.ok(matted >= 0);
   await done(page, edits + 1);
   await page.waitForFunction((covered) => window.radiosity.state().grid.covered > covered, laid.covered);
   assert.ok((await state(page)).grid.least > 0.1 * laid.mean);

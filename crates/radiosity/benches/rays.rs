@@ -195,6 +195,7 @@ fn main() {
             files.push(word);
         }
     }
+    assert!(dump.is_none() || files.len() < 2, "--dump writes one scene: name one file");
     if files.is_empty() {
         measure("Cornell box", &cornell_box(), dump.as_deref());
     }

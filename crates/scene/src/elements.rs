@@ -290,15 +290,13 @@ impl Elements {
         places.for_each(|at| visit(at, share));
     }
 
-    /// Places all over an element at which its optics are looked up: [`Scene::places_for_mean`], or one where nothing varies.
+    /// Places all over an element at which its optics are looked up, on either side of a sheet the same ([`Scene::places_for_mean`]).
     pub fn places(&self, scene: &Scene, mesh: &Mesh, element: ElementId) -> impl ExactSizeIterator<Item = Surface> {
         let (t, _) = self.place(element);
         let piece = self.corners(element);
-        let count = match scene.material(mesh.source[t] as usize).is_varied() || !scene.colors.is_empty() {
-            true => scene.places_for_mean(piece.map(|uv| mesh.surface(t, uv))),
-            false => 1,
-        };
-        places_over(piece, count, element).map(move |uv| mesh.surface(t, uv))
+        let count = scene.places_for_mean(piece.map(|uv| mesh.surface(t, uv)));
+        let seed = self.opposite(element).map_or(element, |other| other.min(element));
+        places_over(piece, count, seed).map(move |uv| mesh.surface(t, uv))
     }
 }
 
@@ -460,6 +458,35 @@ mod tests {
             let mean = means.iter().sum::<f32>() / means.len() as f32;
             let off = means.iter().fold(0f32, |most, m| most.max((m - 0.5).abs()));
             assert!((mean - 0.5).abs() < 0.01 && off < most_off, "{size}: {mean}, {off}");
+        }
+    }
+
+    /// Both sides of a sheet are looked up at the same places: what it gives back and passes on together is no more than it got.
+    #[test]
+    fn sides_of_a_sheet_with_a_picture_are_alike() {
+        let texels = (0..16 * 16).map(|k| if (k % 16 + k / 16) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
+        let tiles = Texture { name: String::new(), width: 16, height: 16, texels: texels.collect() };
+        let wrap = [crate::Wrap::Repeat; 2];
+        let picture = TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap, nearest: true };
+        let transmission =
+            crate::Transmission { transmittance: [0.9; 3], texture: Some(picture), ..crate::Transmission::default() };
+        let sheet = Material {
+            base_color_texture: Some(picture),
+            base_color: [0.05; 4],
+            transmission: Some(transmission),
+            ..Material::default()
+        };
+        let mut scene = Scene { materials: vec![sheet], textures: vec![tiles], ..Scene::default() };
+        let corners = [[0., 0., 0.], [0., 0., 1.], [1., 0., 1.], [1., 0., 0.]].map(DVec3::from);
+        scene.add_quad("sheet", 0, corners);
+        scene.uvs[0] = scene.positions.iter().map(|p| glam::Vec2::new(p.x as f32, p.z as f32)).collect();
+        let mesh = Mesh::new(&scene);
+        let elements = Elements::new(&scene, &mesh, 0.2);
+        for e in 0..elements.len() as u32 {
+            let other = elements.opposite(e).unwrap();
+            assert_ne!(e, other);
+            assert_eq!(elements.optics(&scene, &mesh, e), elements.optics(&scene, &mesh, other));
+            assert_eq!(elements.transmittance(&scene, &mesh, e), elements.transmittance(&scene, &mesh, other));
         }
     }
 }

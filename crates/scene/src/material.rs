@@ -120,11 +120,6 @@ impl Material {
         self.base_color_texture.iter().chain(&self.metallic_texture).chain(&self.emissive_texture).chain(sheet)
     }
 
-    /// Whether a picture varies what the surface is like.
-    pub fn is_varied(&self) -> bool {
-        self.pictures().next().is_some()
-    }
-
     /// Whether light passes through the surface anywhere.
     pub fn transmits(&self) -> bool {
         self.transmission.as_ref().is_some_and(|t| t.transmittance.iter().any(|&tau| tau > 0.0))

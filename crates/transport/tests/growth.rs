@@ -1,5 +1,5 @@
 //! How work and memory grow with the elements (catalogue 44): exponents of lines through logarithms, from counts, which no other
-//! work of the machine changes; by the clock in a test of its own, which is ignored.
+//! work of the machine changes; by the clock in a test of its own, which is ignored. And many right-hand sides go through a table as each alone.
 
 #![expect(clippy::print_stdout, reason = "the exponents are what one runs this for")]
 

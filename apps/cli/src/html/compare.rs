@@ -327,7 +327,7 @@ fn ground(all: &Comparison) -> String {
     let words = note(&format!(
         "The reference is the same equation on the same elements, with the factors of <code>adaptive</code>; errors of methods \
          and solvers are against it, so that the mesh is no part of them. What the mesh costs is told by a path tracer that \
-         shares nothing with them but rays, at {} with two estimates of {} each. Elements are whole, also where they reach \
+         shares nothing with them but rays, at {} with two estimates of about {} each. Elements are whole, also where they reach \
          into solids; the engine by itself leaves these parts out. All factors are solved with by \
          <code>{}</code>.{direct}",
         plural(audit.points, "place"),

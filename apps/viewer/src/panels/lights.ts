@@ -56,10 +56,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
   const lux = el('input', {
     type: 'number', min: 0, step: 'any', 'aria-label': `Illuminance by ${name}, lux`,
     title: light().type === 'sky' ? 'On open level ground' : 'Across its rays',
-    change: () => {
-      const { illuminance } = light();
-      if (illuminance) app.setLight(light(), { dimming: within(lux.valueAsNumber / luminance(illuminance)) });
-    },
+    change: () => app.setLight(light(), { dimming: within(lux.valueAsNumber / undimmed(light())) }),
   });
   const daylight = el('label', { class: 'slider' },
     el('span', { class: 'quiet grow' }, light().type === 'sky' ? 'On open ground' : 'Across its rays'),
@@ -84,16 +81,25 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
       element.hidden = now.deleted;
       element.classList.toggle('off', now.dimming === 0);
       dimming.set(100 * now.dimming);
-      daylight.hidden = !now.illuminance;
-      if (now.illuminance && !isOpen(lux)) lux.value = String(Number((now.dimming * luminance(now.illuminance)).toPrecision(4)));
+      // What gives no light at all cannot be turned up.
+      daylight.hidden = undimmed(now) <= 0;
+      lux.max = String(Math.floor(MOST_DIMMING * undimmed(now)));
+      if (!isOpen(lux)) lux.value = String(Number((now.dimming * undimmed(now)).toPrecision(4)));
       const peak = Math.max(...now.colour, 1e-9);
       if (!isOpen(colour)) colour.value = hex(now.colour.map((c) => c / peak));
     },
   };
 }
 
+/** As far as lights can be turned up. */
+const MOST_DIMMING = 100;
+
 /** As far as lights can be dimmed and turned up. */
-const within = (dimming: number) => Math.min(100, Math.max(0, dimming));
+const within = (dimming: number) => Math.min(MOST_DIMMING, Math.max(0, dimming));
+
+/** Lux by daylight in its colour as it is now, before it is dimmed; 0 of what is not known by its lux. */
+const undimmed = ({ illuminance, colour }: LightNotice) =>
+  illuminance ? luminance([illuminance[0] * colour[0], illuminance[1] * colour[1], illuminance[2] * colour[2]]) : 0;
 
 /** The factor by band that tints light and keeps its luminance. */
 function filter(value: string): [number, number, number] {

@@ -24,7 +24,7 @@ impl Paint {
     /// The paint of an object.
     pub fn new(scene: &Scene, object: usize, shape: &Shape) -> Paint {
         let material = &scene.materials[scene.objects[object].material];
-        let is_varied = material.is_varied() || !scene.colors.is_empty();
+        let is_varied = scene.is_varied(material);
         let transmits = material.transmits();
         let (mut rho, mut tau) = (Vec::new(), Vec::new());
         let (mut sum, mut whole) = ([0f64; 3], 0f64);
@@ -32,7 +32,7 @@ impl Paint {
             let (t, _, _) = shape.place(element);
             let triangle = shape.triangles.start + t;
             if is_varied || element == 0 {
-                let (r, t) = mean_optics(scene, shape, element, is_varied);
+                let (r, t) = mean_optics(scene, shape, element);
                 rho.push(r);
                 tau.push(t);
             }
@@ -86,11 +86,11 @@ pub fn brighter(texture: &Texture, factor: Bands) -> Texture {
     Texture { texels: texture.texels.iter().map(texel).collect(), ..texture.clone() }
 }
 
-fn mean_optics(scene: &Scene, shape: &Shape, element: u32, is_varied: bool) -> (Bands, Bands) {
+fn mean_optics(scene: &Scene, shape: &Shape, element: u32) -> (Bands, Bands) {
     let (t, _, piece) = shape.place(element);
     let triangle = shape.triangles.start + t;
     let (mut rho, mut tau, mut opaque) = ([0f32; 3], [0f32; 3], 0f32);
-    let count = if is_varied { scene.places_for_mean(piece.map(|uv| Surface { triangle, uv })) } else { 1 };
+    let count = scene.places_for_mean(piece.map(|uv| Surface { triangle, uv }));
     for uv in places_over(piece, count, element) {
         let at = Surface { triangle, uv };
         let weight = scene.opacity(at);

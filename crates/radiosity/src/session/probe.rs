@@ -20,13 +20,14 @@ const MOST_KEPT: usize = 8;
 /// itself then, as each knows its own error from two numbers alone.
 const SIGHT: [u32; 2] = [48, 30];
 
-fn of_lanes(lanes: &Lanes<4>) -> f32 {
+/// Luminance of the three bands of a lane.
+pub(super) fn luminance_of(lanes: &Lanes<4>) -> f32 {
     luminance([lanes.0[0], lanes.0[1], lanes.0[2]])
 }
 
 /// An error in percent of the light there; none in the dark, and where it is more than the light nothing is known.
 fn relative(error: &Lanes<4>, h: &Lanes<4>) -> f32 {
-    let (error, h) = (of_lanes(error).abs(), of_lanes(h));
+    let (error, h) = (luminance_of(error).abs(), luminance_of(h));
     if error > 0.0 { (100.0 * error / h.max(error)).min(100.0) } else { 0.0 }
 }
 
@@ -191,9 +192,7 @@ impl Session {
         if let Some((_, weights)) = known.get(&object).filter(|(of, _)| *of == revision) {
             return Some(weights.clone());
         }
-        let of = |list: &[Lanes<4>], element: u32| {
-            list.get(first + element as usize).map_or(0.0, |h| luminance([h.0[0], h.0[1], h.0[2]]))
-        };
+        let of = |list: &[Lanes<4>], element: u32| list.get(first + element as usize).map_or(0.0, luminance_of);
         let guide = |element| (of(&self.state.shown, element) - of(&self.state.direct, element)).max(0.0);
         // As of rays of which one in two finds light; rarer light is noisier and stays so.
         let noise = 1.0 / (rays as f32).sqrt();
@@ -386,7 +385,7 @@ impl Session {
             let Some((error, h)) = seen.and_then(|id| Some((errors.get(id)?, self.state.shown.get(id)?))) else {
                 continue;
             };
-            if of_lanes(h) > 0.0 {
+            if luminance_of(h) > 0.0 {
                 sum += f64::from(relative(error, h)) / 100.0;
                 count += 1;
             }

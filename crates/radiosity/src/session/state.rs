@@ -12,8 +12,9 @@
 
 use super::Session;
 use super::light::{Light, Strand, lamps};
+use super::probe::luminance_of;
 use super::solve::{Solve, tail};
-use radiosity_scene::{Bands, luminance};
+use radiosity_scene::Bands;
 use radiosity_transport::live::{Lanes, NEAR_RAYS, Part, Target};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -511,7 +512,7 @@ impl Session {
         let differences = self.find_errors();
         let (mut square, mut whole) = (0f64, 0f64);
         for ((difference, h), area) in differences.iter().zip(&self.state.shown).zip(&self.answer.area) {
-            let of = |lanes: &Lanes<4>| f64::from(luminance([lanes.0[0], lanes.0[1], lanes.0[2]]));
+            let of = |lanes: &Lanes<4>| f64::from(luminance_of(lanes));
             square += f64::from(*area) * of(difference).powi(2);
             whole += f64::from(*area) * of(h).powi(2);
         }
