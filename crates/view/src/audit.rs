@@ -15,7 +15,7 @@ use radiosity_trace::{Place, Tracer};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Standard errors of the one-sided 95 % bound. The normal quantile, 1.645, held in 91 % of runs in hard rooms (bench `hard`): few
+/// Standard errors of the one-sided 95 % bound. The normal quantile, 1.645, held in 90 of 96 runs in hard rooms (bench `hard`): few
 /// bright paths are in the spread only when they are in the mean, too, and audits end as soon as the bound meets what was asked.
 const ONE_SIDED_95: f64 = 2.0;
 
