@@ -438,18 +438,24 @@ mod tests {
         assert!((total - 1.0).abs() < 1e-12);
     }
 
+    /// A square floor so wide, of a material with a picture of `side` × `side` squares, black and white in turn.
+    fn tiled(side: u32, width: f64, material: impl FnOnce(TextureRef) -> Material) -> Scene {
+        let white = |k: u32| (k % side + k / side).is_multiple_of(2);
+        let texels = (0..side * side).map(|k| if white(k) { [255; 4] } else { [0, 0, 0, 255] }).collect();
+        let tiles = Texture { name: String::new(), width: side, height: side, texels };
+        let wrap = [crate::Wrap::Repeat; 2];
+        let picture = TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap, nearest: true };
+        let mut scene = Scene { materials: vec![material(picture)], textures: vec![tiles], ..Scene::default() };
+        let corners = [[0., 0., 0.], [0., 0., 1.], [1., 0., 1.], [1., 0., 0.]].map(|p| width * DVec3::from(p));
+        scene.add_quad("floor", 0, corners);
+        scene.uvs[0] = scene.positions.iter().map(|p| glam::DVec2::new(p.x, p.z).as_vec2() / width as f32).collect();
+        scene
+    }
+
     /// Squares of a picture that elements divide evenly: a grid of places found one colour in all elements.
     #[test]
     fn the_mean_of_tiles_is_that_of_both_colours() {
-        let texels = (0..64 * 64).map(|k| if (k % 64 + k / 64) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
-        let tiles = Texture { name: String::new(), width: 64, height: 64, texels: texels.collect() };
-        let wrap = [crate::Wrap::Repeat; 2];
-        let picture = TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap, nearest: true };
-        let material = Material { base_color_texture: Some(picture), ..Material::default() };
-        let mut scene = Scene { materials: vec![material], textures: vec![tiles], ..Scene::default() };
-        let corners = [[0., 0., 0.], [0., 0., 4.], [4., 0., 4.], [4., 0., 0.]].map(DVec3::from);
-        scene.add_quad("floor", 0, corners);
-        scene.uvs[0] = scene.positions.iter().map(|p| glam::Vec2::new(p.x as f32, p.z as f32) / 4.0).collect();
+        let scene = tiled(64, 4.0, |picture| Material { base_color_texture: Some(picture), ..Material::default() });
         let mesh = Mesh::new(&scene);
         for (size, most_off) in [(0.25, 0.3), (0.5, 0.25), (1.0, 0.15)] {
             let elements = Elements::new(&scene, &mesh, size);
@@ -464,22 +470,16 @@ mod tests {
     /// Both sides of a sheet are looked up at the same places: what it gives back and passes on together is no more than it got.
     #[test]
     fn sides_of_a_sheet_with_a_picture_are_alike() {
-        let texels = (0..16 * 16).map(|k| if (k % 16 + k / 16) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
-        let tiles = Texture { name: String::new(), width: 16, height: 16, texels: texels.collect() };
-        let wrap = [crate::Wrap::Repeat; 2];
-        let picture = TextureRef { texture: 0, uv_set: 0, transform: DAffine2::IDENTITY, wrap, nearest: true };
-        let transmission =
-            crate::Transmission { transmittance: [0.9; 3], texture: Some(picture), ..crate::Transmission::default() };
-        let sheet = Material {
+        let scene = tiled(16, 1.0, |picture| Material {
             base_color_texture: Some(picture),
             base_color: [0.05; 4],
-            transmission: Some(transmission),
+            transmission: Some(crate::Transmission {
+                transmittance: [0.9; 3],
+                texture: Some(picture),
+                ..crate::Transmission::default()
+            }),
             ..Material::default()
-        };
-        let mut scene = Scene { materials: vec![sheet], textures: vec![tiles], ..Scene::default() };
-        let corners = [[0., 0., 0.], [0., 0., 1.], [1., 0., 1.], [1., 0., 0.]].map(DVec3::from);
-        scene.add_quad("sheet", 0, corners);
-        scene.uvs[0] = scene.positions.iter().map(|p| glam::Vec2::new(p.x as f32, p.z as f32)).collect();
+        });
         let mesh = Mesh::new(&scene);
         let elements = Elements::new(&scene, &mesh, 0.2);
         for e in 0..elements.len() as u32 {
