@@ -114,10 +114,15 @@ impl Material {
         self.emissive.iter().any(|&e| e > 0.0)
     }
 
-    /// Pictures that vary what the surface is like.
-    pub fn pictures(&self) -> impl Iterator<Item = &TextureRef> {
+    /// Pictures that vary what the surface gives back or lets through.
+    pub fn reflectance_pictures(&self) -> impl Iterator<Item = &TextureRef> {
         let sheet = self.transmission.iter().flat_map(|t| t.texture.iter().chain(&t.share_texture));
-        self.base_color_texture.iter().chain(&self.metallic_texture).chain(&self.emissive_texture).chain(sheet)
+        self.base_color_texture.iter().chain(&self.metallic_texture).chain(sheet)
+    }
+
+    /// Pictures that vary what the surface is like, its emission too.
+    pub fn pictures(&self) -> impl Iterator<Item = &TextureRef> {
+        self.reflectance_pictures().chain(&self.emissive_texture)
     }
 
     /// Whether light passes through the surface anywhere.

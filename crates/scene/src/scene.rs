@@ -275,16 +275,16 @@ impl Scene {
         sum.try_normalize()
     }
 
-    /// Whether pictures or vertex colours vary what a surface of a material is like.
-    pub fn is_varied(&self, material: &Material) -> bool {
-        material.pictures().next().is_some() || !self.colors.is_empty()
+    /// Whether pictures or vertex colours vary what a surface of a material gives back or lets through.
+    pub fn varies_reflectance(&self, material: &Material) -> bool {
+        material.reflectance_pictures().next().is_some() || !self.colors.is_empty()
     }
 
     /// Over how many places the optics of a piece of a triangle are averaged, by its corners: one where nothing varies, else one
     /// for each texel of the finest picture, within bounds.
     pub fn places_for_mean(&self, corners: [Surface; 3]) -> u32 {
         let material = self.material(corners[0].triangle);
-        if !self.is_varied(material) {
+        if material.emissive_texture.is_none() && !self.varies_reflectance(material) {
             return 1;
         }
         let texels = |picture: &TextureRef| {

@@ -24,7 +24,7 @@ impl Paint {
     /// The paint of an object.
     pub fn new(scene: &Scene, object: usize, shape: &Shape) -> Paint {
         let material = &scene.materials[scene.objects[object].material];
-        let is_varied = scene.is_varied(material);
+        let is_varied = scene.varies_reflectance(material);
         let transmits = material.transmits();
         let (mut rho, mut tau) = (Vec::new(), Vec::new());
         let (mut sum, mut whole) = ([0f64; 3], 0f64);
