@@ -83,7 +83,7 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
       dimming.set(100 * now.dimming);
       // What gives no light at all cannot be turned up.
       daylight.hidden = undimmed(now) <= 0;
-      lux.max = String(Math.floor(MOST_DIMMING * undimmed(now)));
+      lux.max = String(MOST_DIMMING * undimmed(now));
       if (!isOpen(lux)) lux.value = String(Number((now.dimming * undimmed(now)).toPrecision(4)));
       const peak = Math.max(...now.colour, 1e-9);
       if (!isOpen(colour)) colour.value = hex(now.colour.map((c) => c / peak));
