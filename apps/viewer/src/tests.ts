@@ -27,12 +27,13 @@ export function tests(app: App) {
   return {
     app,
     lux,
-    /** The picture that is drawn now, without what is drawn over it, at places of the canvas (shares of its sides, from
-     *  above left); and what is known there of the light that it should show. None where there is nothing, or an edge. */
+    /** The picture that is drawn now, with all pixels and without what is drawn over it, at places of the canvas (shares of
+     *  its sides, from above left); and what is known there of the light that it should show. None where there is nothing,
+     *  or an edge. Where pixels are few, light changes much across one. */
     seen(places: [number, number][]) {
       const { stage } = app;
       stage.overlay.visible = stage.tools.visible = false;
-      stage.drawNow();
+      stage.drawSharp();
       stage.overlay.visible = stage.tools.visible = true;
       stage.change();
       const gl = stage.renderer.getContext();
