@@ -5,6 +5,7 @@ import { cover } from './cover';
 import { keep, kept, numberOf, type Curve } from './curve';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
+import { boxAhead, panelAhead, resized } from './forms';
 import { follow, lay, open, read, type Grid } from './grid';
 import { beside, lampAhead, type Lamp, type LampKind } from './lamps';
 import { Marks } from './marks';
@@ -15,7 +16,7 @@ import { corners, Stage, type Hit } from './stage';
 import { Mode, shared, Surface } from './surface';
 import {
   Connection, type CameraPlace, type Edit, type Layer, type LightFrame, type LightNotice, type MeshFrame, type Notice,
-  type ObjectNotice, type PlaneAnswer, type ProbeAnswer, type SceneNotice, type StatusNotice, type TextureUse,
+  type NewObject, type ObjectNotice, type PlaneAnswer, type ProbeAnswer, type SceneNotice, type StatusNotice, type TextureUse,
 } from './wire';
 
 /** What can change. */
@@ -67,7 +68,7 @@ export class App {
   /** A light without an object that is moved. */
   selectedLight: number | null = null;
   /** Of which kind the next lamp is that is added. */
-  lampKind: LampKind = 'point';
+  lampKind: LampKind | 'panel' = 'point';
   probed: Probed | null = null;
   grid: Grid | null = null;
   /** A working plane; it or the grid is laid, not both. */
@@ -246,10 +247,11 @@ export class App {
       tint: object.tint, emission: object.emission, transmittance: object.transmittance,
       texture: object.texture ? this.texture(object.texture) : null,
     });
+    if (object.form && 'rectangle' in object.form) surface.showBack();
     surface.matrix.fromArray(object.matrix);
     this.stage.moved(surface);
     this.followed(surface);
-    if (object.deleted && this.selected === id) this.select(null);
+    if (object.deleted && this.selected === id) this.mark(null);
     else if (this.group().includes(surface)) {
       this.marks.outline(this.group());
       this.gizmo.place();
@@ -456,6 +458,11 @@ export class App {
     });
   }
 
+  /** Whether what is selected turns every way: lamps and what was added, while a thing on a floor turns about the zenith. */
+  get isTiltable(): boolean {
+    return this.selectedLight !== null || (this.selected !== null && this.objects.get(this.selected)!.form !== null);
+  }
+
   /** Lets what is selected be moved, though it is part of the building. */
   loosen(): void {
     const object = this.selected === null ? undefined : this.objects.get(this.selected);
@@ -487,7 +494,7 @@ export class App {
     if (edits.length > 0) this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
   }
 
-  /** Moves by a way and turns: by an angle about the zenith, and lamps about the right of who looks. */
+  /** Moves by a way and turns: by an angle about the zenith, and what can be tilted about the right of who looks. */
   nudge(way: Vector3, angle: number, tilt = 0): void {
     const spot = this.spot();
     if (!spot) {
@@ -498,8 +505,9 @@ export class App {
     const motion = new Matrix4().makeTranslation(way.clone().add(spot))
       .multiply(new Matrix4().makeRotationY(angle))
       .multiply(new Matrix4().makeTranslation(spot.clone().negate()));
-    if (this.selectedLight === null) this.move(motion);
-    else this.moveLight(this.selectedLight, motion.multiply(about(spot, right, tilt)));
+    const tilted = this.isTiltable ? motion.multiply(about(spot, right, tilt)) : motion;
+    if (this.selectedLight === null) this.move(tilted);
+    else this.moveLight(this.selectedLight, tilted);
   }
 
   /** About what the selected thing or lamp turns, in the world; none if it cannot be moved. */
@@ -523,15 +531,46 @@ export class App {
     return middle;
   }
 
-  /** Adds a lamp without area where it is seen. */
-  addLamp(kind = this.lampKind): void {
-    const names = new Set([...this.lights.values()].map(({ name }) => name));
+  /** A name that nothing has yet. */
+  private newName(word: string): string {
+    const names = new Set([...this.lights.values(), ...this.objects.values()].map(({ name }) => name));
     let number = 1;
-    while (names.has(`Lamp ${number}`)) number += 1;
-    const light = lampAhead(this.stage, this.navigator.scale, kind, `Lamp ${number}`);
+    while (names.has(`${word} ${number}`)) number += 1;
+    return `${word} ${number}`;
+  }
+
+  /** Adds a lamp where it is seen. */
+  addLamp(kind = this.lampKind): void {
+    if (kind === 'panel') {
+      this.addObject(panelAhead(this.stage, this.navigator.scale, this.newName('Panel')));
+      return;
+    }
+    const light = lampAhead(this.stage, this.navigator.scale, kind, this.newName('Lamp'));
     this.awaitedLamp = ({ name }) => name === light.name;
     this.say(`Added: ${light.name}. It is selected.`);
     this.edit({ add_light: { light } });
+  }
+
+  /** Adds a box where it is seen. */
+  addBox(): void {
+    this.addObject(boxAhead(this.stage, this.navigator.scale, this.newName('Box')));
+  }
+
+  private addObject(object: NewObject): void {
+    this.awaited = [object.matrix];
+    this.say(`Added: ${object.name}. It is selected.`);
+    this.edit({ add: { object } });
+  }
+
+  /** Gives what was added other lengths, metres along its axes: it is made anew. */
+  resize(old: ObjectNotice, size: number[]): void {
+    const lamp = [...this.lights.values()].find((light) => light.object === old.id);
+    const object = resized(old, lamp, size);
+    this.awaited = [object.matrix];
+    const edits: Edit[] = [{ delete: { object: old.id } }, { add: { object } }];
+    // Numbers are given in their order.
+    if (lamp) edits.push({ light: { light: Math.max(...this.lights.keys()) + 1, dimming: lamp.dimming, colour: lamp.colour } });
+    this.edit({ several: edits });
   }
 
   /** The selected lamp without area, if it is one that can be placed. */
@@ -606,6 +645,11 @@ export class App {
   select(object: number | null): void {
     this.awaited = [];
     this.awaitedLamp = null;
+    this.mark(object);
+  }
+
+  /** Selects; what is awaited will be, when it comes. */
+  private mark(object: number | null): void {
     this.selected = object;
     this.selectedLight = null;
     this.marks.outline(this.group());
@@ -620,11 +664,11 @@ export class App {
     this.tell('selection');
   }
 
-  /** What people call a light: copies have the name of the first, and numbers. */
+  /** What people call a light: copies have the name of the first that is there, and numbers. */
   lightName({ id, name, type }: LightNotice): string {
     if (type === 'sky') return 'Sky';
     if (!name) return `Light ${id + 1}`;
-    const before = [...this.lights.values()].filter((light) => light.id < id && light.name === name).length;
+    const before = [...this.lights.values()].filter((light) => light.id < id && light.name === name && !light.deleted).length;
     return before > 0 ? `${name} (${before + 1})` : name;
   }
 
@@ -662,8 +706,8 @@ export class App {
       this.tell('probe');
       return;
     }
-    this.probed = { hit, answer: null };
-    this.marks.point(hit);
+    this.probed = hit.isBack ? null : { hit, answer: null };
+    this.marks.point(hit.isBack ? null : hit);
     this.select(hit.surface.object);
     this.askProbe();
     this.tell('probe');

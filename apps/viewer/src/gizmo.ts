@@ -44,9 +44,8 @@ export class Gizmo {
     this.app.stage.change();
   }
 
-  /** A thing on a floor turns about the zenith; a lamp every way. */
   private offer(): void {
-    this.controls.showX = this.controls.showZ = this.mode === 'translate' || this.app.selectedLight !== null;
+    this.controls.showX = this.controls.showZ = this.mode === 'translate' || this.app.isTiltable;
   }
 
   /** Whether the pointer is on a handle, and so on nothing else. */

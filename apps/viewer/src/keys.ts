@@ -37,9 +37,9 @@ const LIST: [string, [string, string][]][] = [
     ['U O', 'move it away, towards you'],
     ['Page ↑ ↓', 'move it up, down'],
     [', .', 'turn it'],
-    ['Home End', 'tilt the selected lamp'],
+    ['Home End', 'tilt the selected lamp, or what was added'],
     ['M', 'handles: move or turn'],
-    ['Insert', 'add a lamp'],
+    ['Insert  Shift+Insert', 'add a lamp, a box'],
     ['Ctrl+D', 'duplicate'],
     ['Delete', 'delete'],
     ['Ctrl+Z  Ctrl+Y', 'undo, redo'],
@@ -130,7 +130,7 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     m: () => app.gizmo.setMode(app.gizmo.mode === 'translate' ? 'rotate' : 'translate'),
     delete: () => app.delete(),
     backspace: () => app.delete(),
-    insert: () => app.addLamp(),
+    insert: (event) => (event.shiftKey ? app.addBox() : app.addLamp()),
     x: () => screenshot(app),
     n: () => fold(),
     h: () => help.showModal(),
@@ -149,7 +149,7 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
   };
   const size = (event: KeyboardEvent) => (event.shiftKey ? 0.1 : 1) * NUDGE * Math.min(1, app.stage.bounds.getSize(new Vector3()).length() / 5);
   const tilt = (by: number) => {
-    if (app.selectedLight === null) app.say('Lamps without area can be tilted: select one first.');
+    if (!app.isTiltable) app.say('Lamps without area can be tilted, and what was added: select one first.');
     else app.nudge(new Vector3(), 0, by);
   };
   const angle = (event: KeyboardEvent) => ((event.shiftKey ? 0.2 : 1) * TURN * Math.PI) / 180;

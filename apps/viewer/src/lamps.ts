@@ -60,7 +60,7 @@ export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: str
   const white = (intensity: number) => [intensity, intensity, intensity];
   const level = (x: number, y: number, z: number) => new Vector3(x, y, z).applyQuaternion(stage.camera.quaternion).setY(0).normalize();
   const at = (place: Vector3) => stage.toScene(place).toArray();
-  const place = cleared(stage, metre, ahead(stage, metre));
+  const place = inSight(stage, metre);
   if (kind === 'directional') {
     // Over the left shoulder, 45° high: what one sees is lit, and its shadows are seen.
     const direction = level(0.5, 0, -1).add(new Vector3(0, -1, 0));
@@ -68,17 +68,24 @@ export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: str
     return { name, kind, position: at(place), direction: stage.toScene(direction).toArray(), intensity: white(SUN) };
   }
   if (kind === 'point') return { name, kind, position: at(place), intensity: white(FLUX / solidAngle(null)) };
+  return { name, kind: { spot: { inner: INNER, outer: OUTER } }, position: at(hung(stage, metre, place)), intensity: white(FLUX / solidAngle([INNER, OUTER])) };
+}
+
+/** The place above one that is below the ceiling, or as high as the picture shows. */
+export function hung(stage: Stage, metre: number, place: Vector3): Vector3 {
   const ceiling = stage.cast(place, new Vector3(0, 1, 0), Infinity, DoubleSide);
-  // Below the ceiling, or as high as the picture shows.
   let rise = ceiling ? Math.max(0.5 * ceiling.distance, ceiling.distance - BELOW * metre) : metre;
+  const above = () => place.clone().setY(place.y + rise);
   const isSeen = () => {
-    const at = stage.project(place.clone().setY(place.y + rise));
+    const at = stage.project(above());
     return at !== null && at.y > (0.5 - 0.5 * SEEN) * stage.canvas.clientHeight;
   };
   for (let tries = 0; tries < 16 && !isSeen(); tries += 1) rise *= 0.8;
-  place.y += rise;
-  return { name, kind: { spot: { inner: INNER, outer: OUTER } }, position: at(place), intensity: white(FLUX / solidAngle([INNER, OUTER])) };
+  return above();
 }
+
+/** A place in the air in the middle of the picture, clear of what is near. */
+export const inSight = (stage: Stage, metre: number) => cleared(stage, metre, ahead(stage, metre));
 
 /** A place in the air in the middle of the picture, no farther than half way to what is seen there. */
 function ahead(stage: Stage, metre: number): Vector3 {

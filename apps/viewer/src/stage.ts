@@ -23,6 +23,8 @@ export interface Hit {
   triangle: number;
   /** Weights of the triangle's corners 1 and 2. */
   uv: [number, number];
+  /** Whether it is a back that has no light of its own. */
+  isBack: boolean;
 }
 
 /** Pixels drawn for one shown, along each side: fewer while something moves and frames take long. */
@@ -294,9 +296,10 @@ export class Stage {
       const distance = point.distanceTo(origin);
       if (distance >= reach) continue;
       const normal = found.face.normal.clone().transformDirection(surface.matrixWorld);
-      if (normal.dot(direction) > 0) normal.negate();
+      const isBack = normal.dot(direction) > 0;
+      if (isBack) normal.negate();
       const triangle = found.faceIndex!;
-      best = { surface, point, normal, distance, triangle, uv: barycentric(surface, triangle, found.point) };
+      best = { surface, point, normal, distance, triangle, uv: barycentric(surface, triangle, found.point), isBack };
     }
     return best;
   }

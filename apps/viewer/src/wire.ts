@@ -48,7 +48,12 @@ export interface ObjectNotice {
   emission: [number, number, number];
   deleted: boolean;
   movable: boolean;
+  /** Of what was added, in the axes that the matrix carries from; none of what the file has. */
+  form: Form | null;
 }
+
+/** A form about its middle, metres: a box along x, y and z, or a rectangle along x and y whose front is that of +z. */
+export type Form = { box: { size: number[] } } | { rectangle: { size: number[] } };
 
 /** A light. */
 export interface LightNotice {
@@ -60,6 +65,8 @@ export interface LightNotice {
   colour: [number, number, number];
   /** Candela, or lux of parallel light, before it is dimmed and coloured; none with area. */
   intensity: number[] | null;
+  /** Lumens of an object, before it is dimmed and coloured. */
+  flux: number[] | null;
   /** Lux before it is dimmed and coloured: of the sky on open level ground, of parallel light across its rays. */
   illuminance: number[] | null;
   /** Half angles of a spot, radians: full within the first, nothing beyond the second. */
@@ -174,6 +181,16 @@ export interface NewLight {
   intensity: number[];
 }
 
+/** An object that is to be added; the matrix carries from its own axes. */
+export interface NewObject {
+  name: string;
+  form: Form;
+  reflectance: number[];
+  /** lm/m²; none unless it is a lamp. */
+  emission?: number[];
+  matrix: number[];
+}
+
 /** A change of the scene. */
 export type Edit =
   | { light: { light: number; dimming: number; colour: number[] } }
@@ -184,6 +201,7 @@ export type Edit =
   | { change_light: { light: number; kind: LampForm; intensity: number[] } }
   | { copy_light: { light: number; matrix: number[] } }
   | { delete_light: { light: number } }
+  | { add: { object: NewObject } }
   | { copy: { object: number; matrix: number[] } }
   | { delete: { object: number } }
   | { several: Edit[] };

@@ -484,7 +484,7 @@ test('a lamp is added, duplicated, deleted and brought back by keyboard and by m
   await page.locator('#lamp-kind').selectOption('directional');
   await page.locator('#lights button', { hasText: 'Add a lamp' }).click();
   assert.equal((await selected(lights.length + 5)).type, 'directional');
-  await done(page, edits + 9);
+  await done(page, edits + 14);
   const all = await compared(page);
   console.log(`with a spot and parallel light, too: ${(100 * all).toFixed(1)} % from a batch solve`);
   // Shadows of parallel light are sharp, and each lamp has some: 0.084 here, 0.05 with ten times as many elements.
@@ -492,6 +492,99 @@ test('a lamp is added, duplicated, deleted and brought back by keyboard and by m
   await picture(page, 'lamps-added');
   await restored(page);
   assert.ok(difference((await luxOf(page, before.points)).lux, before.lux) < 1e-3, 'all is undone');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('a box and a luminous panel are added, get other lengths and lumens, are tilted and undone, and light follows as a batch solve has it', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  let { edits } = (await state(page)).status;
+  const objects = (await state(page)).objects.length;
+  /** The thing that is selected, once so many were ever there and all light has come. */
+  const newest = async (count) => {
+    await page.waitForFunction((id) => window.radiosity.state().selected === id, objects + count - 1);
+    edits += 1;
+    await done(page, edits);
+    const { objects: all, selected } = await state(page);
+    return all.find(({ id }) => id === selected);
+  };
+  const foot = () => page.evaluate(() => window.radiosity.app.middle().toArray());
+  const number = (name) => page.getByRole('spinbutton', { name, exact: true });
+  const field = async (name, value) => {
+    await number(name).fill(String(value));
+    await number(name).press('Enter');
+  };
+
+  // By keyboard: it stands on something, where one looks.
+  await page.locator('canvas').first().focus();
+  await page.keyboard.press('Shift+Insert');
+  const box = await newest(1);
+  assert.equal(box.name, 'Box 1');
+  const seen = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const box = app.stage.box(app.group()[0]);
+    const below = app.stage.cast(app.middle().setY(box.min.y + 1e-4), app.middle().set(0, -1, 0), 1, 2);
+    return { height: box.max.y - box.min.y, gap: below?.distance, at: app.stage.project(app.middle()) };
+  });
+  const [, , height] = box.form.box.size;
+  assert.ok(Math.abs(seen.height - height) < 1e-6 && seen.gap < 2e-4 && seen.at.x > 0 && seen.at.y > 0, JSON.stringify(seen));
+  const stood = await foot();
+  await field('Height, metres', 2 * height);
+  const tall = await newest(2);
+  assert.deepEqual(tall.form.box.size, [box.form.box.size[0], box.form.box.size[1], 2 * height]);
+  (await foot()).forEach((x, k) => assert.ok(Math.abs(x - stood[k]) < 1e-5, 'it stands where it stood'));
+  assert.ok(box.id !== tall.id && (await state(page)).objects.find(({ id }) => id === box.id).deleted);
+  assert.equal((await state(page)).undo, 'resize Box 1');
+  await picture(page, 'box');
+
+  // A panel below the ceiling, half as bright and of another form: its lumens stay.
+  await page.locator('#lamp-kind').selectOption('panel');
+  await page.getByRole('button', { name: 'Add a lamp' }).click();
+  const panel = await newest(3);
+  const lamp = async () => (await state(page)).lights.filter(({ deleted }) => !deleted).at(-1);
+  assert.equal(panel.name, 'Panel 1');
+  assert.ok(Math.abs((await lamp()).flux[1] - 4000) < 1, `${(await lamp()).flux}`);
+  await field('Luminous flux of Panel 1, lumens', 20);
+  edits += 1;
+  await done(page, edits);
+  assert.ok(Math.abs((await lamp()).dimming - 0.005) < 1e-6);
+  await field('Width, metres', 0.25);
+  await newest(4);
+  const wide = await lamp();
+  assert.ok(Math.abs(wide.flux[1] - 4000) < 1 && Math.abs(wide.dimming - 0.005) < 1e-6, JSON.stringify(wide));
+  assert.equal(await number('Luminous flux of Panel 1, lumens').inputValue(), '20', 'the old one is gone, and its name free');
+  // Lower, and tilted by 30°: away from the ceiling, whose elements are too large for what shines along them.
+  await page.locator('canvas').first().focus();
+  for (const key of [...Array(6).fill('Home'), 'PageDown', 'PageDown', 'PageDown']) await page.keyboard.press(key);
+  edits += 9;
+  await done(page, edits);
+  const tilted = (await state(page)).objects.find(({ id }) => id === objects + 3);
+  assert.ok(Math.abs(tilted.matrix[9] + Math.cos((30 * Math.PI) / 180)) < 1e-4, `${tilted.matrix}`);
+  // Its back is seen from here, and can be clicked; no light is read there.
+  await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const [at, { clientWidth, clientHeight }] = [app.stage.project(app.middle().setY(app.box().getCenter(app.middle()).y)), app.stage.canvas];
+    app.select(null);
+    app.pick((2 * at.x) / clientWidth - 1, 1 - (2 * at.y) / clientHeight);
+  });
+  assert.equal((await state(page)).selected, objects + 3);
+  await picture(page, 'panel');
+  assert.equal((await state(page)).probe, null);
+  const off = await compared(page);
+  console.log(`a box and a panel: ${(100 * off).toFixed(1)} % from a batch solve`);
+  assert.ok(off < NEAR, `${off}`);
+
+  // All of it is taken back, and made again.
+  const light = await luxOf(page, 60);
+  await restored(page);
+  const { objects: all, lights, redo } = await state(page);
+  assert.ok(all.slice(objects).every(({ deleted }) => deleted) && lights.filter(({ deleted }) => !deleted).length === 1 && redo === 'add Box 1', redo);
+  ({ edits } = (await state(page)).status);
+  for (let k = 0; k < 14; k += 1) await page.keyboard.press('Control+y');
+  await done(page, edits + 10);
+  assert.deepEqual(await luxOf(page, 60), light);
+  await restored(page);
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });

@@ -4,7 +4,8 @@
 mod room;
 
 use radiosity::session::{
-    Applied, Edit, EditError, Layer, LightId, LightKind, MOST_EDITS, NewLight, ObjectId, Session, SessionOptions,
+    Applied, Edit, EditError, Form, Layer, LightId, LightKind, MOST_EDITS, NewLight, NewObject, ObjectId, Session,
+    SessionOptions,
 };
 use radiosity::{
     Bands, Mesh, PointLight, PointLightKind, Scene, Side, Solution, SolveOptions, Tracer, cornell_box, luminance,
@@ -83,13 +84,28 @@ impl Dice {
         NewLight { name: "added".to_owned(), kind, position: at, direction, intensity: [50.0, 40.0, 30.0] }
     }
 
+    /// A box or a lamp.
+    fn object(&mut self, reach: f64) -> NewObject {
+        let mut length = || self.between(0.1, 0.6) * reach;
+        let (size, emission) = ([length(), length(), length()], [[0.0; 3], [900.0, 800.0, 0.0]][self.below(2)]);
+        let form = if self.below(2) == 0 { Form::Box { size } } else { Form::Rectangle { size: [size[0], size[1]] } };
+        NewObject {
+            name: "added".to_owned(),
+            form,
+            reflectance: [0.2, 0.5, 0.8],
+            emission,
+            matrix: (glam::DMat4::from_cols_array(&self.matrix(reach)) * glam::DMat4::from_rotation_x(1.3))
+                .to_cols_array(),
+        }
+    }
+
     fn edit(&mut self, session: &Session, reach: f64) -> Edit {
         let model = session.model();
         let object = ObjectId(self.below(model.objects.len()) as u32);
         let light = LightId(self.below(model.lights.len()) as u32);
         // Of lights without area, as most are refused to others.
         let lamp = model.lights.iter().rfind(|light| light.intensity.is_some()).map_or(light, |light| light.id);
-        match self.below(13) {
+        match self.below(15) {
             0 | 1 => Edit::Light {
                 light,
                 dimming: if self.below(4) == 0 { 0.0 } else { self.between(0.0, 2.0) as f32 },
@@ -109,6 +125,7 @@ impl Dice {
                 let intensity = [self.between(0.0, 100.0) as f32, 40.0, 0.0];
                 Edit::ChangeLight { light: lamp, kind: self.kind(), intensity }
             }
+            12 | 13 => Edit::Add { object: self.object(reach) },
             _ => match model.objects.iter().find(|object| object.deleted) {
                 Some(deleted) if self.below(2) == 0 => Edit::Restore { object: deleted.id },
                 _ => Edit::Delete { object },
@@ -276,6 +293,130 @@ fn catalogue_77_a_changed_lamp_is_one_that_was_always_so() {
     assert_eq!(session.apply(&of(LightId(9))), Err(EditError::UnknownLight(LightId(9))));
     session.apply(&Edit::DeleteLight { light: LightId(1) }).unwrap();
     assert_eq!(session.apply(&of(LightId(1))), Err(EditError::DeletedLight(LightId(1))));
+}
+
+/// A box and a lamp are added, and then copied, moved, made anew: the light is, to the last bit, that of a session which opens the
+/// edited scene, where both were from the beginning.
+#[test]
+fn catalogue_77_what_is_added_is_as_if_it_had_always_been_there() {
+    let size = glam::DVec3::new(0.2, 0.05, 0.1);
+    let at = |x: f64, y: f64, z: f64| glam::DMat4::from_translation(glam::DVec3::new(x, y, z));
+    let object = NewObject {
+        name: "crate".to_owned(),
+        form: Form::Box { size: size.to_array() },
+        reflectance: [0.8, 0.4, 0.2],
+        emission: [0.0; 3],
+        matrix: at(0.12, 0.4, 0.1).to_cols_array(),
+    };
+    let down = glam::DMat4::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let panel = NewObject {
+        name: "panel".to_owned(),
+        form: Form::Rectangle { size: [0.2, 0.1] },
+        emission: [30.0, 40.0, 50.0],
+        matrix: (at(0.4, 0.5, 0.2) * down).to_cols_array(),
+        ..object.clone()
+    };
+    let options = SessionOptions { element_size: Some(0.06), ..small() };
+    let mut session = Session::new(cornell_box(), &options).unwrap();
+    finish(&mut session);
+    let before = bits(&session);
+    let first = session.model().objects.len() as u32;
+
+    let mut inverse = Vec::new();
+    let mut apply = |session: &mut Session, edit: Edit| {
+        let applied = session.apply(&edit).unwrap();
+        session.step(Duration::from_millis(1));
+        inverse.push(applied.inverse.clone());
+        applied
+    };
+    let added = apply(&mut session, Edit::Add { object: object.clone() });
+    assert_eq!((&added.added[..], &added.added_lights[..]), (&[ObjectId(first)][..], &[][..]));
+    let added = apply(&mut session, Edit::Add { object: panel.clone() });
+    assert_eq!((&added.added[..], &added.added_lights[..]), (&[ObjectId(first + 1)][..], &[LightId(1)][..]));
+    let model = session.model();
+    let light = &model.lights[1];
+    for (flux, exitance) in light.flux.unwrap().into_iter().zip(panel.emission) {
+        assert!((flux - 0.02 * exitance).abs() < 1e-5 * exitance, "{flux} lm");
+    }
+    assert!(model.objects[first as usize].movable && model.objects[first as usize].form == Some(object.form));
+    finish(&mut session);
+    let lit = bits(&session);
+    assert_ne!(lit[..before.len()], before[..]);
+    // In one series: an object of it may be moved and copied in it.
+    let copies = Edit::Several(vec![
+        Edit::Add { object: object.clone() },
+        Edit::Move { object: ObjectId(first + 2), matrix: at(0.3, 0.3, 0.4).to_cols_array() },
+        Edit::Copy { object: ObjectId(first + 2), matrix: at(0.3, 0.1, 0.5).to_cols_array() },
+        Edit::Copy { object: ObjectId(first + 1), matrix: (at(0.1, 0.3, 0.4) * down).to_cols_array() },
+        Edit::Light { light: LightId(2), dimming: 0.5, colour: [1.0; 3] },
+        Edit::Delete { object: ObjectId(first) },
+    ]);
+    apply(&mut session, copies);
+    finish(&mut session);
+
+    // The edited scene, and the same edits before the first ray.
+    let (edited, now) = (session.edited_scene(), bits(&session));
+    let mut opened = Session::new(edited.clone(), &options).unwrap();
+    finish(&mut opened);
+    let of = |session: &Session, name: &str| -> Vec<Vec<Bands>> {
+        let model = session.model();
+        let named = model.objects.iter().filter(|object| object.name == name && !object.deleted);
+        named.map(|object| session.irradiance(object.id)).collect()
+    };
+    let sum = |lights: &[Vec<Bands>]| lights.iter().flatten().map(|e| f64::from(luminance(*e))).sum::<f64>();
+    for name in ["crate", "panel", "floor", "ceiling"] {
+        let (a, b) = (of(&session, name), of(&opened, name));
+        assert_eq!(a.iter().map(Vec::len).collect::<Vec<_>>(), b.iter().map(Vec::len).collect::<Vec<_>>());
+        assert!((sum(&a) / sum(&b) - 1.0).abs() < 0.03, "{name}: {} instead of {}", sum(&a), sum(&b));
+    }
+    // Nothing was taken away: every number is the same.
+    let mut whole = Session::new(cornell_box(), &options).unwrap();
+    for object in [&object, &panel] {
+        whole.apply(&Edit::Add { object: object.clone() }).unwrap();
+    }
+    let mut opened = Session::new(whole.edited_scene(), &options).unwrap();
+    finish(&mut opened);
+    assert!(bits(&opened) == lit);
+
+    for edit in inverse.iter().rev() {
+        session.apply(edit).unwrap();
+    }
+    finish(&mut session);
+    assert!(bits(&session)[..before.len()] == before[..]);
+    assert_ne!(now[..before.len()], before[..]);
+}
+
+/// What no object can be is refused, with nothing changed.
+#[test]
+fn what_cannot_be_added_is_refused() {
+    let mut session = Session::new(cornell_box(), &small()).unwrap();
+    let sound = NewObject {
+        name: String::new(),
+        form: Form::Box { size: [0.1; 3] },
+        reflectance: [0.5; 3],
+        emission: [0.0; 3],
+        matrix: glam::DMat4::IDENTITY.to_cols_array(),
+    };
+    let far = glam::DMat4::from_translation(glam::DVec3::X * 1e3).to_cols_array();
+    for (wrong, why) in [
+        (NewObject { form: Form::Box { size: [0.1, 0.0, 0.1] }, ..sound.clone() }, "lengths"),
+        (NewObject { form: Form::Rectangle { size: [0.1, f64::NAN] }, ..sound.clone() }, "lengths"),
+        (NewObject { form: Form::Rectangle { size: [0.1, f64::INFINITY] }, ..sound.clone() }, "lengths"),
+        (NewObject { form: Form::Rectangle { size: [0.1, 1e3] }, ..sound.clone() }, "from the middle"),
+        (NewObject { matrix: far, ..sound.clone() }, "from the middle"),
+        (NewObject { matrix: [0.0; 16], ..sound.clone() }, "no placement"),
+        (NewObject { reflectance: [0.5, 1.0, 0.5], ..sound.clone() }, "reflectance"),
+        (NewObject { emission: [0.5, -1.0, 0.5], ..sound.clone() }, "emission"),
+        (NewObject { emission: [f32::NAN; 3], ..sound.clone() }, "emission"),
+        (NewObject { name: "x".repeat(201), ..sound.clone() }, "name"),
+    ] {
+        let error = session.apply(&Edit::Add { object: wrong.clone() }).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}: {wrong:?}");
+    }
+    let many = Edit::Several(vec![Edit::Add { object: sound }, Edit::Delete { object: ObjectId(99) }]);
+    let objects = session.model().objects.len();
+    assert_eq!(session.apply(&many), Err(EditError::UnknownObject(ObjectId(99))));
+    assert_eq!((session.model().objects.len(), session.scene().objects.len()), (objects, objects));
 }
 
 #[test]

@@ -81,6 +81,7 @@ pub enum Target {
     LightPlace(LightId),
     LightShape(LightId),
     LightPresence(LightId),
+    NewObject,
     NewLight,
 }
 
@@ -90,6 +91,7 @@ pub fn targets(edit: &Edit) -> Vec<Target> {
         Edit::Light { light, .. } => vec![Target::Light(*light)],
         Edit::MoveLight { light, .. } => vec![Target::LightPlace(*light)],
         Edit::ChangeLight { light, .. } => vec![Target::LightShape(*light)],
+        Edit::Add { .. } => vec![Target::NewObject],
         Edit::AddLight { .. } => vec![Target::NewLight],
         Edit::CopyLight { light, .. } | Edit::DeleteLight { light } | Edit::RestoreLight { light } => {
             vec![Target::LightPresence(*light)]
@@ -111,6 +113,8 @@ pub fn label(edit: &Edit, model: &Model) -> String {
         Edit::Light { light: id, .. } => format!("dim {}", light(id)),
         Edit::MoveLight { light: id, .. } => format!("move {}", light(id)),
         Edit::ChangeLight { light: id, .. } => format!("change {}", light(id)),
+        Edit::Add { object } if object.name.is_empty() => "add an object".to_owned(),
+        Edit::Add { object } => format!("add {}", object.name),
         Edit::AddLight { light } if light.name.is_empty() => "add a light".to_owned(),
         Edit::AddLight { light } => format!("add {}", light.name),
         Edit::CopyLight { light: id, .. } => format!("duplicate {}", light(id)),
@@ -121,6 +125,10 @@ pub fn label(edit: &Edit, model: &Model) -> String {
         Edit::Copy { object: id, .. } => format!("duplicate {}", object(id)),
         Edit::Delete { object: id } => format!("delete {}", object(id)),
         Edit::Restore { object: id } => format!("restore {}", object(id)),
+        // What gets another form is another object.
+        Edit::Several(edits) if let [Edit::Delete { object: id }, Edit::Add { .. }, ..] = edits.as_slice() => {
+            format!("resize {}", object(id))
+        }
         Edit::Several(edits) => edits.first().map_or_else(String::new, |first| label(first, model)),
     }
 }
@@ -143,10 +151,10 @@ pub fn refusal(error: &EditError, model: &Model) -> String {
     text.replacen(&id, &name, 1)
 }
 
-/// Copies have the name of the first, and numbers.
+/// Copies have the name of the first that is there, and numbers.
 fn light_name(id: LightId, model: &Model) -> String {
     let named = model.lights.iter().find(|light| light.id == id).map_or("", |light| light.name.as_str());
-    let before = model.lights.iter().filter(|light| light.id < id && light.name == named).count();
+    let before = model.lights.iter().filter(|light| light.id < id && light.name == named && !light.deleted).count();
     match (named, before) {
         ("", _) => format!("Light {}", id.0 + 1),
         (name, 0) => name.to_owned(),

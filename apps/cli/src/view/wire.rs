@@ -12,7 +12,7 @@ use super::board::{CHUNK, LightChunk};
 use axum::body::Bytes;
 use glam::{DVec2, DVec3};
 use half::f16;
-use radiosity::session::{Edit, Layer, LightId, ModelLight, ModelObject, ObjectId, PlaneFigures, PlaneQuestion};
+use radiosity::session::{Edit, Form, Layer, LightId, ModelLight, ModelObject, ObjectId, PlaneFigures, PlaneQuestion};
 use radiosity::{Bands, Scene, Surface, Texture, TextureRef, Wrap};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
@@ -122,6 +122,8 @@ pub enum Say<'a> {
         emission: Bands,
         deleted: bool,
         movable: bool,
+        /// Of what was added.
+        form: Option<Form>,
     },
     Light {
         id: LightId,
@@ -131,6 +133,8 @@ pub enum Say<'a> {
         colour: Bands,
         /// Candela, or lux of parallel light, before it is dimmed and coloured; none with area.
         intensity: Option<Bands>,
+        /// Lumens of an object, before it is dimmed and coloured.
+        flux: Option<Bands>,
         /// Lux before it is dimmed and coloured: of the sky on open level ground, of parallel light across its rays.
         illuminance: Option<Bands>,
         /// Half angles of a spot, radians.
@@ -300,6 +304,7 @@ pub fn object(object: &ModelObject, scene: &Scene) -> String {
         emission: object.emission.map(|exitance| exitance / PI),
         deleted: object.deleted,
         movable: object.movable,
+        form: object.form,
     }
     .text()
 }
@@ -330,6 +335,7 @@ pub fn light(light: &ModelLight) -> String {
         dimming: light.dimming,
         colour: light.colour,
         intensity: light.intensity,
+        flux: light.flux,
         illuminance: light.illuminance,
         cone: light.cone,
         matrix: light.matrix,

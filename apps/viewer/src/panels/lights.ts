@@ -9,20 +9,23 @@ const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', direct
 
 export function lightsPanel(app: App): HTMLElement {
   const list = el('div', { class: 'list' });
-  const rows = new Map<number, { element: HTMLElement; set(light: LightNotice): void }>();
+  const rows = new Map<number, Row>();
   const none = el('p', { class: 'quiet' }, 'This scene has no light.');
   const all = el('div', { class: 'row' },
     button('All on', () => app.turnOn(), { title: 'Turn all lights on; after “All off” as they were' }),
     button('All off', () => app.turnOff(), { title: 'Turn all lights off' }));
   const kind = el('select', {
-    id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind; },
-  }, ...LAMPS.map(([value, text]) => el('option', { value }, text)));
-  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp in the middle of the picture: 1000 lm, parallel light 10 000 lx' }));
+    id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind | 'panel'; },
+  }, ...[...LAMPS, ['panel', 'Panel']].map(([value, text]) => el('option', { value }, text)));
+  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp in the middle of the picture: 1000 lm, a panel 4000 lm, parallel light 10 000 lx' }));
   app.on('lights', () => {
     for (const light of app.lights.values()) {
-      if (!rows.has(light.id)) {
+      const old = rows.get(light.id);
+      // A copy has another name when the first is gone.
+      if (old?.name !== app.lightName(light)) {
         const next = Math.min(...[...rows.keys()].filter((id) => id > light.id));
         rows.set(light.id, row(app, light.id));
+        old?.element.remove();
         list.insertBefore(rows.get(light.id)!.element, rows.get(next)?.element ?? null);
       }
       rows.get(light.id)!.set(light);
@@ -34,7 +37,14 @@ export function lightsPanel(app: App): HTMLElement {
   return section('lights', 'Lights', true, none, add, all, list);
 }
 
-function row(app: App, id: number): { element: HTMLElement; set(light: LightNotice): void } {
+/** A light in the list. */
+interface Row {
+  name: string;
+  element: HTMLElement;
+  set(light: LightNotice): void;
+}
+
+function row(app: App, id: number): Row {
   const light = () => app.lights.get(id)!;
   let gesture: number | null = null;
   let last = 1;
@@ -52,15 +62,15 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
   const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%' }, (value, isLast) => {
     app.setLight(light(), { dimming: within(value / 100) }, during(isLast));
   });
-  // Daylight is known by its lux.
-  const lux = el('input', {
-    type: 'number', min: 0, step: 'any', 'aria-label': `Illuminance by ${name}, lux`,
-    title: light().type === 'sky' ? 'On open level ground' : 'Across its rays',
-    change: () => app.setLight(light(), { dimming: within(lux.valueAsNumber / undimmed(light())) }),
+  // Daylight is known by its lux, and what shines by its lumens.
+  const [what, unit] = { sky: ['On open ground', 'lx'], object: ['All its light', 'lm'] }[light().type as string] ?? ['Across its rays', 'lx'];
+  const amount = el('input', {
+    type: 'number', min: 0, step: 'any', 'aria-label': unit === 'lm' ? `Luminous flux of ${name}, lumens` : `Illuminance by ${name}, lux`,
+    change: () => app.setLight(light(), { dimming: within(amount.valueAsNumber / undimmed(light())) }),
   });
-  const daylight = el('label', { class: 'slider' },
-    el('span', { class: 'quiet grow' }, light().type === 'sky' ? 'On open ground' : 'Across its rays'),
-    el('span', { class: 'number' }, lux, el('span', { class: 'unit' }, 'lx')));
+  const absolute = el('label', { class: 'slider' },
+    el('span', { class: 'quiet grow' }, what),
+    el('span', { class: 'number' }, amount, el('span', { class: 'unit' }, unit)));
   const colour = el('input', {
     type: 'color', 'aria-label': `Colour of ${name}, relative to its own`, title: 'Colour, relative to its own; its light in lumens stays',
     input: () => app.setLight(light(), { colour: filter(colour.value) }, during(false)),
@@ -71,8 +81,9 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
     click: () => (light().object !== null ? app.select(light().object) : app.selectLight(id)),
   }, el('b', {}, name));
   const element = el('div', { class: 'light' },
-    el('div', { class: 'row' }, el('label', { class: 'toggle bare' }, on, el('i')), find, colour), dimming, daylight);
+    el('div', { class: 'row' }, el('label', { class: 'toggle bare' }, on, el('i')), find, colour), dimming, absolute);
   return {
+    name,
     element,
     set(now) {
       if (now.dimming > 0) last = now.dimming;
@@ -82,9 +93,9 @@ function row(app: App, id: number): { element: HTMLElement; set(light: LightNoti
       element.classList.toggle('off', now.dimming === 0);
       dimming.set(100 * now.dimming);
       // What gives no light at all cannot be turned up.
-      daylight.hidden = undimmed(now) <= 0;
-      lux.max = String(MOST_DIMMING * undimmed(now));
-      if (!isOpen(lux)) lux.value = String(Number((now.dimming * undimmed(now)).toPrecision(4)));
+      absolute.hidden = undimmed(now) <= 0;
+      amount.max = String(MOST_DIMMING * undimmed(now));
+      if (!isOpen(amount)) amount.value = String(Number((now.dimming * undimmed(now)).toPrecision(4)));
       const peak = Math.max(...now.colour, 1e-9);
       if (!isOpen(colour)) colour.value = hex(now.colour.map((c) => c / peak));
     },
@@ -97,9 +108,11 @@ const MOST_DIMMING = 100;
 /** As far as lights can be dimmed and turned up. */
 const within = (dimming: number) => Math.min(MOST_DIMMING, Math.max(0, dimming));
 
-/** Lux by daylight in its colour as it is now, before it is dimmed; 0 of what is not known by its lux. */
-const undimmed = ({ illuminance, colour }: LightNotice) =>
-  illuminance ? luminance([illuminance[0] * colour[0], illuminance[1] * colour[1], illuminance[2] * colour[2]]) : 0;
+/** Lux by daylight or lumens of what shines in its colour as it is now, before it is dimmed; 0 of other lights. */
+function undimmed({ illuminance, flux, colour }: LightNotice): number {
+  const own = illuminance ?? flux;
+  return own ? luminance(own.map((band, k) => band * colour[k])) : 0;
+}
 
 /** The factor by band that tints light and keeps its luminance. */
 function filter(value: string): [number, number, number] {

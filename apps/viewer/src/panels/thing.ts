@@ -1,6 +1,7 @@
 // What is selected: its paint, its place, copies of it.
 import { Vector3 } from 'three';
 import type { App } from '../app';
+import { sizeOf } from '../forms';
 import { turnOf } from '../gizmo';
 import { brighter, LAMPS, type LampKind, remade, solidAngle } from '../lamps';
 import { luminance } from '../luminance';
@@ -86,6 +87,18 @@ export function thingPanel(app: App): HTMLElement {
     el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Kind'), kind),
     el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Intensity'), el('span', { class: 'pair' }, intensity, unit, fluxes)),
     cones);
+  // Lengths of what was added.
+  const lengths = ['Width', 'Depth', 'Height'].map((label, k) => el('input', {
+    type: 'number', min: 0, step: 0.05, 'aria-label': `${label}, metres`, title: `${label}, metres`, change: () => {
+      const object = app.selected === null ? undefined : app.objects.get(app.selected);
+      if (!object?.form) return;
+      const size = [...sizeOf(object.form)];
+      size[k] = lengths[k].valueAsNumber;
+      if (size[k] > 0) app.resize(object, size);
+      else show();
+    },
+  }));
+  const sizing = el('div', { class: 'numbers' }, ...lengths.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'WDH'[k]), input)));
   /** The thing or the lamp that is selected. */
   const chosen = () => (app.selectedLight !== null ? app.lights.get(app.selectedLight) : app.selected !== null ? app.objects.get(app.selected) : undefined);
 
@@ -122,7 +135,7 @@ export function thingPanel(app: App): HTMLElement {
   const fixed = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Part of the building, so it stays put.'), button('Let it move', () => app.loosen()));
   const painting = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Reflectance'), paint, reflectance, el('span', { class: 'unit' }, '%'));
   const copying = el('div', { class: 'row' }, copy, remove);
-  const body = el('div', {}, name, painting, lighting, moving, fixed, copying);
+  const body = el('div', {}, name, painting, lighting, sizing, moving, fixed, copying);
   const none = el('p', { class: 'quiet' }, 'Click a thing, press Enter for what is under the cross, or P for one after the other.');
 
   const show = () => {
@@ -142,6 +155,12 @@ export function thingPanel(app: App): HTMLElement {
       if (!isOpen(paint)) paint.value = hex(object.reflectance);
       if (!isOpen(reflectance)) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
     }
+    const size = object?.form ? sizeOf(object.form) : [];
+    sizing.hidden = size.length === 0;
+    lengths.forEach((input, k) => {
+      input.parentElement!.hidden = k >= size.length;
+      if (!isOpen(input) && k < size.length) input.value = String(Number(size[k].toPrecision(4)));
+    });
     lighting.hidden = !light?.intensity;
     if (light?.intensity) {
       const put = (input: HTMLInputElement, value: number) => { if (!isOpen(input)) input.value = String(Number(value.toPrecision(4))); };
@@ -172,5 +191,6 @@ export function thingPanel(app: App): HTMLElement {
   app.on('selection', show);
   app.on('objects', show);
   app.on('lights', offer);
-  return section('thing', 'Selected', true, el('div', { class: 'row' }, list), none, body);
+  const add = button('Add a box', () => app.addBox(), { key: 'Shift+Insert', title: 'Add a box of half a metre in the middle of the picture' });
+  return section('thing', 'Selected', true, el('div', { class: 'row' }, list, add), none, body);
 }

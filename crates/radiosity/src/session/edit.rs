@@ -1,6 +1,6 @@
 //! What may be changed in a scene that is being watched, and why a change is refused.
 
-use crate::session::{LightId, ObjectId};
+use crate::session::{LightId, NewObject, ObjectId};
 use radiosity_scene::{Bands, PointLightKind};
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +40,7 @@ pub struct NewLight {
 }
 
 /// A change of the scene. Matrices are by columns and carry the object as the file places it, in world coordinates, to
-/// where it shall be: the identity is its place in the file.
+/// where it shall be: the identity is its place in the file. What was added is carried from its own axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Edit {
@@ -104,6 +104,12 @@ pub enum Edit {
     RestoreLight {
         /// The light.
         light: LightId,
+    },
+    /// Adds an object, which gets the next free id ([`Applied::added`]), and a light if it shines
+    /// ([`Applied::added_lights`]). Its own axes are what matrices carry from.
+    Add {
+        /// The object.
+        object: NewObject,
     },
     /// Adds a copy of an object, which gets the next free id ([`Applied::added`]).
     Copy {
@@ -208,6 +214,9 @@ pub enum EditError {
     /// The light is there.
     #[error("light {} has not been deleted", .0.0)]
     LightNotDeleted(LightId),
+    /// An object that cannot be added.
+    #[error("the object cannot be added: {0}")]
+    NewObject(&'static str),
     /// A light that cannot be added.
     #[error("the light cannot be added: {0}")]
     NewLight(&'static str),

@@ -1,14 +1,16 @@
 //! Edits are checked as a whole, then carried out; and the scene as they leave it.
 
+use super::added::LONGEST_NAME;
 use super::edit::{Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
 use super::light::{Light, distance, kind_of};
 use super::paint::brighter;
-use super::{LightId, MOST_COLUMNS, ObjectId, Session, bytes};
+use super::{LightId, MOST_COLUMNS, ObjectId, Placed, Session, bytes};
 use glam::{DAffine3, DMat4, DVec3};
 use radiosity_scene::material::MAX_REFLECTANCE;
 use radiosity_scene::{Bands, PointLight, PointLightKind, Scene, Sky, Source};
 use radiosity_transport::live::{REACH, World};
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 /// How much larger or smaller than in the file an object may be made, as a factor of its volume.
 const MOST_SCALE: f64 = 1e9;
@@ -32,10 +34,18 @@ pub struct Done {
 /// What is there while a series of edits is checked.
 struct Known {
     present: Vec<bool>,
-    /// Which object each is a copy of.
-    source: Vec<usize>,
+    origin: Vec<Origin>,
     lights: Vec<KnownLight>,
     elements: usize,
+}
+
+/// What an object is, or a copy of.
+#[derive(Clone)]
+enum Origin {
+    /// An object that is there already.
+    Body(usize),
+    /// One that the series adds: its corners in its own axes, its elements, whether it shines.
+    New(Rc<[DVec3]>, usize, bool),
 }
 
 #[derive(Clone, Copy)]
@@ -70,16 +80,13 @@ impl KnownLamp {
 /// What is wrong with a light elsewhere.
 const TOO_FAR: &str = "it would be too far from the middle of the scene";
 
-/// Letters of the name of a light that is added.
-const LONGEST_NAME: usize = 200;
-
 impl Session {
     /// Whether an edit can be carried out.
     pub(super) fn check(&self, edit: &Edit) -> Result<(), EditError> {
         let bodies = &self.live.world().bodies;
         let mut known = Known {
             present: bodies.iter().map(|body| body.is_present).collect(),
-            source: (0..bodies.len()).collect(),
+            origin: (0..bodies.len()).map(Origin::Body).collect(),
             lights: self
                 .lights
                 .iter()
@@ -101,7 +108,7 @@ impl Session {
         let there = |object: ObjectId, known: &Known| match known.present.get(object.0 as usize) {
             None => Err(EditError::UnknownObject(object)),
             Some(false) => Err(EditError::Deleted(object)),
-            Some(true) => Ok(known.source[object.0 as usize]),
+            Some(true) => Ok(known.origin[object.0 as usize].clone()),
         };
         // A light without area, and whether it is gone.
         let placeable = |light: LightId, known: &Known| match known.lights.get(light.0 as usize) {
@@ -134,8 +141,8 @@ impl Session {
                 }
             }
             Edit::Move { object, matrix } => {
-                let source = there(*object, known)?;
-                self.check_place(*object, source, matrix)?;
+                let origin = there(*object, known)?;
+                self.check_place(*object, &origin, matrix)?;
             }
             Edit::MoveLight { light, matrix } => {
                 let lamp = lit(*light, known)?;
@@ -172,13 +179,18 @@ impl Session {
                 known.lights[light.0 as usize].is_gone = false;
             }
             Edit::Copy { object, matrix } => {
-                let source = there(*object, known)?;
-                self.check_place(*object, source, matrix)?;
-                let body = &self.live.world().bodies[source];
-                let light = self.objects[source].light.map(|_| KnownLight { is_gone: false, lamp: None });
-                known.present.push(true);
-                known.source.push(source);
-                self.check_more(known, body.elements() as usize + 1, light)?;
+                let origin = there(*object, known)?;
+                self.check_place(*object, &origin, matrix)?;
+                self.check_object(origin, known)?;
+            }
+            Edit::Add { object } => {
+                if let Some(why) = object.fault(world.half) {
+                    return Err(EditError::NewObject(why));
+                }
+                let corners = object.form.triangles().into_iter().flatten().collect();
+                let origin = Origin::New(corners, object.elements(world.element_size()), object.shines());
+                self.check_place(ObjectId(known.present.len() as u32), &origin, &object.matrix)?;
+                self.check_object(origin, known)?;
             }
             Edit::Delete { object } => {
                 there(*object, known)?;
@@ -199,6 +211,19 @@ impl Session {
             }
         }
         Ok(())
+    }
+
+    /// Whether there is room for another object, and its light.
+    fn check_object(&self, origin: Origin, known: &mut Known) -> Result<(), EditError> {
+        let (elements, shines) = match &origin {
+            Origin::Body(body) => {
+                (self.live.world().bodies[*body].elements() as usize, self.objects[*body].light.is_some())
+            }
+            Origin::New(_, elements, shines) => (*elements, *shines),
+        };
+        known.present.push(true);
+        known.origin.push(origin);
+        self.check_more(known, elements + 1, shines.then_some(KnownLight { is_gone: false, lamp: None }))
     }
 
     /// Whether there is room for more ids, and for a light.
@@ -235,13 +260,15 @@ impl Session {
         check_lamp(light.kind, &light.intensity).map_or_else(refuse, |()| Ok(lamp))
     }
 
-    fn check_place(&self, object: ObjectId, source: usize, matrix: &[f64; 16]) -> Result<(), EditError> {
+    fn check_place(&self, object: ObjectId, origin: &Origin, matrix: &[f64; 16]) -> Result<(), EditError> {
         let placed = check_matrix(matrix)?;
         let world = self.live.world();
         let most = REACH * world.half;
-        let corners = world.bodies[source].shape.corners.iter().flatten();
-        let distance =
-            corners.map(|p| (placed.transform_point3(*p) - world.middle).abs().max_element()).fold(0.0, f64::max);
+        let away = |p: &DVec3| (placed.transform_point3(*p) - world.middle).abs().max_element();
+        let distance = match origin {
+            Origin::Body(body) => world.bodies[*body].shape.corners.iter().flatten().map(away).fold(0.0, f64::max),
+            Origin::New(corners, ..) => corners.iter().map(away).fold(0.0, f64::max),
+        };
         // Written so that what is no number is refused, too.
         if distance <= most { Ok(()) } else { Err(EditError::TooFar { object, distance, most }) }
     }
@@ -293,7 +320,7 @@ impl Session {
                 inverse
             }
             Edit::AddLight { light } => {
-                let down = -self.scene.up.direction();
+                let down = -self.scene().up.direction();
                 let point = PointLight {
                     name: light.name.clone(),
                     kind: light.kind,
@@ -322,16 +349,20 @@ impl Session {
                 let added = self.live.copy(object.0 as usize, affine(matrix));
                 let light = original.light.map(|light| Light { body: Some(added), ..self.lights[light].clone() });
                 // Copies of what belongs together, made together, belong together.
-                let new = self.objects.iter().map(|object| object.group).max().unwrap_or(0) + 1;
+                let new = self.next_group();
                 let group = *done.groups.entry(original.group).or_insert(new);
-                self.objects.push(super::Placed { matrix: *matrix, light: None, group, ..original });
-                if let Some(light) = light {
-                    done.added_lights.push(self.lights.len());
-                    self.add_light(light);
-                }
-                done.added.push(added);
-                self.touch(added, done);
-                Edit::Delete { object: ObjectId(added as u32) }
+                self.put_object(Placed { matrix: *matrix, light: None, group, ..original }, light, done)
+            }
+            Edit::Add { object } => {
+                let mut source = 0;
+                let make = |scene: &mut Scene| {
+                    source = object.add_to(scene);
+                    source
+                };
+                let added = self.live.add_new(make, affine(&object.matrix));
+                let light = Light::of_body(&self.live, added, &object.name, self.mean_exitance);
+                let placed = Placed::new(&self.live, source, added, self.next_group());
+                self.put_object(Placed { matrix: object.matrix, form: Some(object.form), ..placed }, light, done)
             }
             Edit::Delete { object } => {
                 self.live.remove(object.0 as usize);
@@ -350,6 +381,24 @@ impl Session {
                 Edit::Several(inverse)
             }
         }
+    }
+
+    /// A number for what belongs to nothing that is there.
+    fn next_group(&self) -> u32 {
+        self.objects.iter().map(|object| object.group).max().unwrap_or(0) + 1
+    }
+
+    /// Adds an object that is in the world by now, and its light; answers what takes it back.
+    fn put_object(&mut self, placed: Placed, light: Option<Light>, done: &mut Done) -> Edit {
+        let index = self.objects.len();
+        self.objects.push(placed);
+        if let Some(light) = light {
+            done.added_lights.push(self.lights.len());
+            self.add_light(light);
+        }
+        done.added.push(index);
+        self.touch(index, done);
+        Edit::Delete { object: ObjectId(index as u32) }
     }
 
     /// Adds a light without area; answers what takes it back.
@@ -384,7 +433,7 @@ impl Session {
     /// The scene as it is edited now, to be written to a file: what was moved is where it is, what was painted has materials of
     /// its own, and what was taken away is gone. Lights that were dimmed give as much as they do.
     pub fn edited_scene(&self) -> Scene {
-        let from = &*self.scene;
+        let from = self.scene();
         let mut scene = Scene {
             positions: Vec::new(),
             normals: Vec::new(),
@@ -466,8 +515,8 @@ impl Session {
                 scene.materials.push(material);
                 scene.materials.len() - 1
             };
-            let is_copy = index >= from.objects.len();
-            let source = if is_copy { Source { node: index, mesh: index, ..Source::default() } } else { object.source };
+            let is_new = index >= self.handed_in;
+            let source = if is_new { Source { node: index, mesh: index, ..Source::default() } } else { object.source };
             scene.objects.push(radiosity_scene::Object {
                 name: object.name.clone(),
                 material,

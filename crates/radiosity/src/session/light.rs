@@ -3,7 +3,7 @@
 use super::model::LightKind;
 use glam::DVec3;
 use radiosity_scene::{Bands, PointLight, PointLightKind, Scene, luminance};
-use radiosity_transport::live::{Lamp, Live, REACH, World};
+use radiosity_transport::live::{Lamp, Live, REACH, Shape, World};
 use radiosity_transport::luminaires::BRIGHT;
 
 /// Lights with a column of their own; those beyond share the last one. A column takes 32 bytes per element, and five of them
@@ -49,6 +49,14 @@ impl Light {
             strand: 0,
             is_gone: false,
         }
+    }
+
+    /// An object that shines; nothing of others.
+    pub fn of_body(live: &Live, body: usize, name: &str, mean_exitance: f64) -> Option<Light> {
+        let shape = &live.world().bodies[body].shape;
+        let shines = shape.exitance.iter().flatten().any(|e| *e > 0.0);
+        let is_direct = is_direct(shape, mean_exitance);
+        shines.then(|| Light { body: Some(body), is_direct, ..Light::new(LightKind::Object, name) })
     }
 
     /// A light without area.
@@ -103,23 +111,21 @@ pub struct Strand {
     pub is_shared: bool,
 }
 
-/// Whether an object shines so brightly that shadow rays go to it: as luminaires of batch work, by the brightest of its
-/// triangles; and what rows would not get right, emission that varies within triangles.
-pub fn is_direct(live: &Live, body: usize) -> bool {
-    let bodies = &live.world().bodies;
-    let shape = &bodies[body].shape;
+/// Mean exitance of all that is there, lm/m².
+pub fn mean_exitance(live: &Live) -> f64 {
     let (mut power, mut area) = (0f64, 0f64);
-    for other in bodies.iter().take(live.world().scene.objects.len()) {
-        let shape = &other.shape;
-        let sides = 1.0 + f64::from(u8::from(shape.has_two_sides));
-        for (t, [a, b, c]) in shape.corners.iter().enumerate() {
-            let own = 0.5 * sides * (*b - *a).cross(*c - *a).length();
-            area += own;
-            power += own * shape.exitance.get(t).map_or(0.0, |e| f64::from(luminance(*e)));
-        }
+    for body in &live.world().bodies {
+        power += f64::from(luminance(body.flux()));
+        area += (0..body.elements()).map(|element| body.area(element)).sum::<f64>();
     }
+    power / area.max(f64::MIN_POSITIVE)
+}
+
+/// Whether an object shines so brightly beside a mean that shadow rays go to it: as luminaires of batch work, by the
+/// brightest of its triangles; and what rows would not get right, emission that varies within triangles.
+fn is_direct(shape: &Shape, mean_exitance: f64) -> bool {
     let peak = shape.exitance.iter().map(|e| luminance(*e)).fold(0f32, f32::max);
-    shape.is_varied || shape.is_see_through || f64::from(peak) > BRIGHT * power / area.max(f64::MIN_POSITIVE)
+    shape.is_varied || shape.is_see_through || f64::from(peak) > BRIGHT * mean_exitance
 }
 
 /// A point light as it hangs from a ceiling: nobody turns what shines in all directions, and glTF has −Z for what is not turned.
@@ -133,14 +139,11 @@ fn hung(point: &PointLight, scene: &Scene) -> PointLight {
 const UNTURNED: f64 = 1e-6;
 
 /// The lights of a scene: objects that shine, lights without area, the sky.
-pub fn lights_of(scene: &Scene, live: &Live) -> Vec<Light> {
-    let mut lights = Vec::new();
-    for (body, object) in scene.objects.iter().enumerate() {
-        if live.world().bodies[body].shape.exitance.iter().flatten().any(|e| *e > 0.0) {
-            let is_direct = is_direct(live, body);
-            lights.push(Light { body: Some(body), is_direct, ..Light::new(LightKind::Object, &object.name) });
-        }
-    }
+pub fn lights_of(live: &Live, mean_exitance: f64) -> Vec<Light> {
+    let scene = &live.world().scene;
+    let bodies = 0..scene.objects.len();
+    let shining = bodies.filter_map(|body| Light::of_body(live, body, &scene.objects[body].name, mean_exitance));
+    let mut lights: Vec<Light> = shining.collect();
     lights.extend(scene.lights.iter().map(|point| Light::without_area(hung(point, scene), live.world())));
     if !scene.sky.is_black() {
         lights.push(Light { is_direct: false, ..Light::new(LightKind::Sky, "sky") });

@@ -32,6 +32,7 @@
 //! Objects are not sewn together as [`Mesh`](radiosity_scene::Mesh) does it for batch work, since they move: light is
 //! smooth within an object and may jump between two that touch.
 
+mod added;
 mod display;
 mod edit;
 mod edited;
@@ -45,6 +46,7 @@ mod rectangle;
 mod solve;
 mod state;
 
+pub use added::{Form, MOST_EXITANCE, NewObject};
 pub use edit::{Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 pub use plane::{Plane, PlaneError, PlaneFigures, PlanePoint, PlaneQuestion, PlaneReading};
@@ -122,8 +124,10 @@ pub struct Status {
 
 /// A scene that is lit while it is looked at and changed while it is lit.
 pub struct Session {
-    scene: Arc<Scene>,
     live: Live,
+    /// Objects of the scene as it was handed in, and their mean exitance, lm/m².
+    handed_in: usize,
+    mean_exitance: f64,
     objects: Vec<Placed>,
     lights: Vec<Light>,
     strands: Vec<Strand>,
@@ -151,6 +155,8 @@ struct Kept {
 struct Placed {
     /// Of the scene.
     source: usize,
+    /// None of what was handed in.
+    form: Option<Form>,
     paint: Arc<Paint>,
     display: Arc<OnceLock<Display>>,
     coat: Option<Bands>,
@@ -159,6 +165,24 @@ struct Placed {
     group: u32,
     /// Whether people would move it.
     is_movable: bool,
+}
+
+impl Placed {
+    /// An object of the scene, where its own coordinates have it.
+    fn new(live: &Live, source: usize, body: usize, group: u32) -> Placed {
+        let world = live.world();
+        Placed {
+            source,
+            form: None,
+            paint: Arc::new(Paint::new(&world.scene, source, &world.bodies[body].shape)),
+            display: Arc::default(),
+            coat: None,
+            matrix: glam::DMat4::IDENTITY.to_cols_array(),
+            light: None,
+            group,
+            is_movable: true,
+        }
+    }
 }
 
 /// Least shadow rays from an element to a light that are shared out.
@@ -189,12 +213,14 @@ impl Session {
             return Err(Error::Memory { elements, rays: rays as usize, needed, allowed });
         }
 
-        let scene = Arc::new(scene);
-        let live = Live::new(scene.clone(), size, most);
-        let lights = light::lights_of(&scene, &live);
+        let live = Live::new(Arc::new(scene), size, most);
+        let mean_exitance = light::mean_exitance(&live);
+        let lights = light::lights_of(&live, mean_exitance);
+        let objects = placed(&live);
         let mut session = Session {
-            objects: placed(&scene, &live),
-            scene,
+            handed_in: objects.len(),
+            mean_exitance,
+            objects,
             live,
             lights: Vec::new(),
             strands: Vec::new(),
@@ -258,9 +284,10 @@ impl Session {
         self.answer.measure();
     }
 
-    /// The scene as it was handed in: pictures, materials, the triangles that numbers refer to.
+    /// The scene as it was handed in, and after it what was added, in its own axes: pictures, materials, the triangles
+    /// that numbers refer to.
     pub fn scene(&self) -> &Scene {
-        &self.scene
+        &self.live.world().scene
     }
 
     /// Changes the scene. The light follows in the next steps.
@@ -363,7 +390,8 @@ fn element_size(scene: &Scene, options: &SessionOptions) -> f64 {
 }
 
 /// The objects of a scene as the file has them.
-fn placed(scene: &Scene, live: &Live) -> Vec<Placed> {
+fn placed(live: &Live) -> Vec<Placed> {
+    let scene = &live.world().scene;
     let mut group = 0;
     let mut last: Option<&radiosity_scene::Object> = None;
     let mut all = Vec::with_capacity(scene.objects.len());
@@ -376,17 +404,7 @@ fn placed(scene: &Scene, live: &Live) -> Vec<Placed> {
         });
         group += u32::from(!is_next);
         last = Some(object);
-        let shape = &live.world().bodies[source].shape;
-        all.push(Placed {
-            source,
-            paint: Arc::new(Paint::new(scene, source, shape)),
-            display: Arc::default(),
-            coat: None,
-            matrix: glam::DMat4::IDENTITY.to_cols_array(),
-            light: None,
-            group,
-            is_movable: true,
-        });
+        all.push(Placed::new(live, source, source, group));
     }
     let guessed = movable::movable(live.world(), &all);
     all.iter_mut().zip(guessed).for_each(|(placed, is_movable)| placed.is_movable = is_movable);

@@ -1,5 +1,6 @@
 //! What a viewer draws: objects as meshes whose vertices carry light, lights, cameras.
 
+use super::Form;
 use radiosity_scene::Bands;
 use serde::{Deserialize, Serialize};
 
@@ -66,6 +67,8 @@ pub struct ModelObject {
     pub deleted: bool,
     /// Whether people would move it, as is guessed from the scene as it was handed in: furniture, and not the building.
     pub movable: bool,
+    /// What was added has one, in the coordinates that the matrix carries from; what was handed in has none.
+    pub form: Option<Form>,
     /// The light that it is, if it shines.
     pub light: Option<LightId>,
 }
@@ -101,6 +104,8 @@ pub struct ModelLight {
     pub colour: Bands,
     /// Of lights without area, before they are dimmed and coloured: candela per band, or lux per band of parallel light.
     pub intensity: Option<Bands>,
+    /// Of objects, before they are dimmed and coloured: lumens per band.
+    pub flux: Option<Bands>,
     /// Lux per band, before they are dimmed and coloured: of the sky on open level ground, of parallel light across its rays.
     pub illuminance: Option<Bands>,
     /// Of spots: the half angles inside which they are as bright as they get, and outside which there is no light, radians.

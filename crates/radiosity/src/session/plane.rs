@@ -253,7 +253,7 @@ impl Session {
             body.filter(|body| body.is_present && triangle < body.elements() && uv.iter().all(|x| x.is_finite()));
         let body = body.ok_or(PlaneError::NoSurface)?;
         let (picked, side, _) = body.shape.place(triangle);
-        let up = self.scene.up.direction();
+        let up = self.scene().up.direction();
         let towards = if side == Side::Front { 1.0 } else { -1.0 };
         let normal = towards * body.normals[picked];
         if normal.dot(up) < LEVEL {

@@ -36,7 +36,7 @@ impl Session {
         let placed = &self.objects[object];
         let world = self.live.world();
         let shape = &world.bodies[object].shape;
-        placed.display.get_or_init(|| Display::new(&self.scene, placed.source, shape, world.half))
+        placed.display.get_or_init(|| Display::new(self.scene(), placed.source, shape, world.half))
     }
 
     /// What to draw.
@@ -50,12 +50,12 @@ impl Session {
             },
         };
         let mut model = Model {
-            name: self.scene.name.clone(),
+            name: self.scene().name.clone(),
             objects: Vec::new(),
             lights: Vec::new(),
-            cameras: self.scene.cameras.iter().map(camera).collect(),
+            cameras: self.scene().cameras.iter().map(camera).collect(),
             bounds: [[0.0; 3]; 2],
-            up: self.scene.up.direction().to_array(),
+            up: self.scene().up.direction().to_array(),
         };
         self.update_model(&mut model);
         model
@@ -70,8 +70,8 @@ impl Session {
                 let (low, high) = (body.bounds.low + world.middle, body.bounds.high + world.middle);
                 bounds = Some(bounds.map_or([low, high], |[a, b]| [a.min(low), b.max(high)]));
             }
-            let object = &self.scene.objects[placed.source];
-            let material = &self.scene.materials[object.material];
+            let object = &self.scene().objects[placed.source];
+            let material = &self.scene().materials[object.material];
             let factor = placed.light.map_or([0.0; 3], |light| self.lights[light].factor());
             let exitance = &body.shape.exitance;
             let mean: Bands = std::array::from_fn(|band| {
@@ -105,6 +105,7 @@ impl Session {
                     emission: [0.0; 3],
                     deleted: false,
                     movable: placed.is_movable,
+                    form: placed.form,
                     light: None,
                 });
             }
@@ -137,8 +138,9 @@ impl Session {
                 dimming: light.dimming,
                 colour: light.colour,
                 intensity: light.point.as_ref().map(|point| point.intensity),
+                flux: light.body.map(|body| world.bodies[body].flux()),
                 illuminance: match (light.kind, &light.point) {
-                    (LightKind::Sky, _) => Some(self.scene.sky.horizontal()),
+                    (LightKind::Sky, _) => Some(self.scene().sky.horizontal()),
                     (LightKind::Directional, Some(point)) => Some(point.intensity),
                     _ => None,
                 },

@@ -457,7 +457,7 @@ impl Session {
             };
             match light.body {
                 None => {
-                    let sky = self.live.world().sky.radiosity(&self.scene.sky);
+                    let sky = self.live.world().sky.radiosity(&self.scene().sky);
                     sky.into_iter().enumerate().for_each(|(id, given)| add(id, given));
                 }
                 Some(body) => {

@@ -249,6 +249,17 @@ impl Body {
         0.5 * (b - a).cross(c - a).length() / f64::from(self.shape.division[t].pow(2))
     }
 
+    /// What it shines with, lm per band, both sides together.
+    pub fn flux(&self) -> Bands {
+        let sides = if self.shape.has_two_sides { 2.0 } else { 1.0 };
+        let mut sum = [0f64; 3];
+        for ([a, b, c], exitance) in self.corners.iter().zip(&self.shape.exitance) {
+            let area = 0.5 * (*b - *a).cross(*c - *a).length();
+            (0..3).for_each(|band| sum[band] += sides * area * f64::from(exitance[band]));
+        }
+        sum.map(|flux| flux as f32)
+    }
+
     /// How many times the surface goes around a point, fronts outwards: the solid angle that it fills over 4π (van Oosterom and
     /// Strackee 1983; Jacobson, Kavan and Sorkine-Hornung 2013). 1 inside a closed solid, 0 outside, and near to that where
     /// the solid has small holes.

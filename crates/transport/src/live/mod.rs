@@ -211,7 +211,16 @@ impl Live {
 
     /// Adds a copy of an object; answers its number.
     pub fn copy(&mut self, body: usize, matrix: DAffine3) -> usize {
-        let shape = self.world.bodies[body].shape.clone();
+        self.add(self.world.bodies[body].shape.clone(), matrix)
+    }
+
+    /// Adds an object that was not in the scene: `make` puts it there and answers which it is. Answers its number here.
+    pub fn add_new(&mut self, make: impl FnOnce(&mut Scene) -> usize, matrix: DAffine3) -> usize {
+        let object = make(Arc::make_mut(&mut self.world.scene));
+        self.add(self.world.shape(object), matrix)
+    }
+
+    fn add(&mut self, shape: Arc<Shape>, matrix: DAffine3) -> usize {
         let added = self.world.add(shape, matrix);
         self.world.place(added, matrix);
         self.note(added, None);

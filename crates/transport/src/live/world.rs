@@ -22,8 +22,10 @@ const MOST_BACKS: u32 = 64;
 
 /// All objects.
 pub struct World {
-    /// The scene as handed in, for its pictures.
+    /// The scene as handed in, with what was added since: numbers of triangles refer to it.
     pub scene: Arc<Scene>,
+    /// Width of an element, metres.
+    size: f64,
     /// The objects; those taken away too.
     pub bodies: Vec<Body>,
     /// The sky's patches, which have the first ids.
@@ -82,10 +84,11 @@ impl World {
             apart: Vec::new(),
             is_opaque: true,
             ids: sky.len() as u32,
-            scene: scene.clone(),
+            scene,
+            size,
         };
-        for object in 0..scene.objects.len() {
-            world.add(Arc::new(Shape::new(&scene, object, size)), DAffine3::IDENTITY);
+        for object in 0..world.scene.objects.len() {
+            world.add(world.shape(object), DAffine3::IDENTITY);
         }
         world.gather_trees();
         world
@@ -94,6 +97,16 @@ impl World {
     /// Number of ids: the sky's patches, then for each object its elements and its black backs.
     pub fn ids(&self) -> usize {
         self.ids as usize
+    }
+
+    /// An object of the scene, cut into elements.
+    pub fn shape(&self, object: usize) -> Arc<Shape> {
+        Arc::new(Shape::new(&self.scene, object, self.size))
+    }
+
+    /// Width of an element, metres.
+    pub fn element_size(&self) -> f64 {
+        self.size
     }
 
     /// Adds an object, without a tree; answers its number.
