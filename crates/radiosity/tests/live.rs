@@ -125,7 +125,7 @@ impl Dice {
                 let intensity = [self.between(0.0, 100.0) as f32, 40.0, 0.0];
                 Edit::ChangeLight { light: lamp, kind: self.kind(), intensity }
             }
-            12 | 13 => Edit::Add { object: self.object(reach) },
+            12 | 13 => Edit::Add { object: Box::new(self.object(reach)) },
             _ => match model.objects.iter().find(|object| object.deleted) {
                 Some(deleted) if self.below(2) == 0 => Edit::Restore { object: deleted.id },
                 _ => Edit::Delete { object },
@@ -329,9 +329,9 @@ fn catalogue_77_what_is_added_is_as_if_it_had_always_been_there() {
         inverse.push(applied.inverse.clone());
         applied
     };
-    let added = apply(&mut session, Edit::Add { object: object.clone() });
+    let added = apply(&mut session, Edit::Add { object: Box::new(object.clone()) });
     assert_eq!((&added.added[..], &added.added_lights[..]), (&[ObjectId(first)][..], &[][..]));
-    let added = apply(&mut session, Edit::Add { object: panel.clone() });
+    let added = apply(&mut session, Edit::Add { object: Box::new(panel.clone()) });
     assert_eq!((&added.added[..], &added.added_lights[..]), (&[ObjectId(first + 1)][..], &[LightId(1)][..]));
     let model = session.model();
     let light = &model.lights[1];
@@ -344,7 +344,7 @@ fn catalogue_77_what_is_added_is_as_if_it_had_always_been_there() {
     assert_ne!(lit[..before.len()], before[..]);
     // In one series: an object of it may be moved and copied in it.
     let copies = Edit::Several(vec![
-        Edit::Add { object: object.clone() },
+        Edit::Add { object: Box::new(object.clone()) },
         Edit::Move { object: ObjectId(first + 2), matrix: at(0.3, 0.3, 0.4).to_cols_array() },
         Edit::Copy { object: ObjectId(first + 2), matrix: at(0.3, 0.1, 0.5).to_cols_array() },
         Edit::Copy { object: ObjectId(first + 1), matrix: (at(0.1, 0.3, 0.4) * down).to_cols_array() },
@@ -372,7 +372,7 @@ fn catalogue_77_what_is_added_is_as_if_it_had_always_been_there() {
     // Nothing was taken away: every number is the same.
     let mut whole = Session::new(cornell_box(), &options).unwrap();
     for object in [&object, &panel] {
-        whole.apply(&Edit::Add { object: object.clone() }).unwrap();
+        whole.apply(&Edit::Add { object: Box::new(object.clone()) }).unwrap();
     }
     let mut opened = Session::new(whole.edited_scene(), &options).unwrap();
     finish(&mut opened);
@@ -410,10 +410,10 @@ fn what_cannot_be_added_is_refused() {
         (NewObject { emission: [f32::NAN; 3], ..sound.clone() }, "emission"),
         (NewObject { name: "x".repeat(201), ..sound.clone() }, "name"),
     ] {
-        let error = session.apply(&Edit::Add { object: wrong.clone() }).unwrap_err().to_string();
+        let error = session.apply(&Edit::Add { object: Box::new(wrong.clone()) }).unwrap_err().to_string();
         assert!(error.contains(why), "{error}: {wrong:?}");
     }
-    let many = Edit::Several(vec![Edit::Add { object: sound }, Edit::Delete { object: ObjectId(99) }]);
+    let many = Edit::Several(vec![Edit::Add { object: Box::new(sound) }, Edit::Delete { object: ObjectId(99) }]);
     let objects = session.model().objects.len();
     assert_eq!(session.apply(&many), Err(EditError::UnknownObject(ObjectId(99))));
     assert_eq!((session.model().objects.len(), session.scene().objects.len()), (objects, objects));

@@ -109,7 +109,7 @@ pub enum Edit {
     /// ([`Applied::added_lights`]). Its own axes are what matrices carry from.
     Add {
         /// The object.
-        object: NewObject,
+        object: Box<NewObject>,
     },
     /// Adds a copy of an object, which gets the next free id ([`Applied::added`]).
     Copy {
