@@ -1,5 +1,5 @@
 // All that the page knows, and what can be done with it. Panels and keys call the verbs here and listen to topics.
-import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
+import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, Quaternion, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
 import { Ahead } from './ahead';
 import { cover } from './cover';
 import { keep, kept, numberOf, type Curve } from './curve';
@@ -7,7 +7,7 @@ import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
 import { boxAhead, panelAhead, resized } from './forms';
 import { follow, lay, open, read, type Grid } from './grid';
-import { beside, lampAhead, type Lamp, type LampKind } from './lamps';
+import { beside, lampAhead, raysOf, type Lamp, type LampKind, type Sun } from './lamps';
 import { Marks } from './marks';
 import { Navigator } from './navigate';
 import { BORDER, HEIGHT, PlaneAsker, type WorkingPlane } from './plane';
@@ -420,12 +420,19 @@ export class App {
     this.edit({ light: { light: id, dimming, colour } }, gesture);
   }
 
+  /** Lets parallel light come from a height and a direction about the zenith, radians. */
+  shineFrom({ id, direction }: LightNotice, sun: Sun): void {
+    const now = new Vector3().fromArray(direction!).applyQuaternion(this.stage.root.quaternion).normalize();
+    this.moveLight(id, new Matrix4().makeRotationFromQuaternion(new Quaternion().setFromUnitVectors(now, raysOf(sun))));
+  }
+
   /** Moves a light without area by a motion of the world, from where it is or from a given place. */
-  moveLight(id: number, motion: Matrix4, gesture?: number, from: Pick<LightNotice, 'matrix' | 'position'> = this.lights.get(id)!): void {
+  moveLight(id: number, motion: Matrix4, gesture?: number, from: Pick<LightNotice, 'matrix' | 'position' | 'direction'> = this.lights.get(id)!): void {
     const inScene = this.inScene(motion);
     const matrix = inScene.clone().multiply(new Matrix4().fromArray(from.matrix)).toArray();
     const position = from.position && new Vector3().fromArray(from.position).applyMatrix4(inScene).toArray();
-    this.lightsAhead.change(id, { matrix, position });
+    const direction = from.direction && new Vector3().fromArray(from.direction).transformDirection(inScene).toArray();
+    this.lightsAhead.change(id, { matrix, position, direction });
     this.edit({ move_light: { light: id, matrix } }, gesture);
   }
 

@@ -12,7 +12,7 @@ export class Gizmo {
   private handle = new Object3D();
   private start = new Matrix4();
   private places = new Map<Surface, Matrix4>();
-  private light: Pick<LightNotice, 'matrix' | 'position'> | null = null;
+  private light: Pick<LightNotice, 'matrix' | 'position' | 'direction'> | null = null;
   private gesture = 0;
   isDragging = false;
 

@@ -55,6 +55,22 @@ export function brighter(intensity: number[], wanted: number): number[] {
   return intensity.map((band) => (now > 0 ? (band * wanted) / now : wanted));
 }
 
+/** Where parallel light comes from, radians: how high it stands, and clockwise from above from −Z of the page's world, which is +Y
+ *  of scenes whose zenith is +Z: north, where the scene says nothing else. */
+export interface Sun {
+  altitude: number;
+  azimuth: number;
+}
+
+/** Where the sun stands whose rays go along a unit vector of the world, and the rays of a sun. */
+export function sunOf({ x, y, z }: Vector3): Sun {
+  return { altitude: Math.asin(Math.min(1, Math.max(-1, -y))), azimuth: (Math.atan2(-x, z) + 2 * Math.PI) % (2 * Math.PI) };
+}
+export function raysOf({ altitude, azimuth }: Sun): Vector3 {
+  const level = Math.cos(altitude);
+  return new Vector3(-level * Math.sin(azimuth), -Math.sin(altitude), level * Math.cos(azimuth));
+}
+
 /** A lamp of a kind where who looks sees it. `metre` is as long as a metre is to people who fit into the scene. */
 export function lampAhead(stage: Stage, metre: number, kind: LampKind, name: string): NewLight {
   const white = (intensity: number) => [intensity, intensity, intensity];

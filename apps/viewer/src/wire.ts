@@ -74,6 +74,8 @@ export interface LightNotice {
   /** From its place in the file to where it is now. */
   matrix: number[];
   position: number[] | null;
+  /** Where spots and parallel light shine to, in the scene's axes. */
+  direction: number[] | null;
   object: number | null;
   deleted: boolean;
 }

@@ -141,6 +141,8 @@ pub enum Say<'a> {
         cone: Option<[f64; 2]>,
         matrix: [f64; 16],
         position: Option<[f64; 3]>,
+        /// Where spots and parallel light shine to.
+        direction: Option<[f64; 3]>,
         object: Option<ObjectId>,
         deleted: bool,
     },
@@ -340,6 +342,7 @@ pub fn light(light: &ModelLight) -> String {
         cone: light.cone,
         matrix: light.matrix,
         position: light.position,
+        direction: light.direction,
         object: light.object,
         deleted: light.deleted,
     }

@@ -3,7 +3,7 @@ import { Vector3 } from 'three';
 import type { App } from '../app';
 import { sizeOf } from '../forms';
 import { turnOf } from '../gizmo';
-import { brighter, LAMPS, type LampKind, remade, solidAngle } from '../lamps';
+import { brighter, LAMPS, type LampKind, remade, solidAngle, sunOf } from '../lamps';
 import { luminance } from '../luminance';
 import { coordinate } from '../scale';
 import { button, choice, el, hex, isOpen, linear, section } from './parts';
@@ -87,6 +87,17 @@ export function thingPanel(app: App): HTMLElement {
     el('label', { class: 'field' }, el('span', { class: 'quiet' }, 'Kind'), kind),
     el('div', { class: 'field' }, el('span', { class: 'quiet' }, 'Intensity'), el('span', { class: 'pair' }, intensity, unit, fluxes)),
     cones);
+  /** Where parallel light comes from, degrees. */
+  const sun = () => sunOf(new Vector3().fromArray(lamp()!.direction!).applyQuaternion(app.stage.root.quaternion).normalize());
+  const angles = ([
+    ['altitude', 'Altitude', 'How high the light stands above the horizon, degrees'],
+    ['azimuth', 'Azimuth', 'Where it comes from, degrees clockwise from above: from −Z, or from +Y where +Z is up'],
+  ] as const).map(([angle, name, title]) => [angle, name, number(`${name}, degrees`, title, (value) => {
+    app.shineFrom(lamp()!, { ...sun(), [angle]: (value * Math.PI) / 180 });
+  })] as const);
+  angles[0][2].min = '-90';
+  angles[0][2].max = '90';
+  const standing = el('div', { class: 'numbers' }, ...angles.map(([, name, input]) => el('label', {}, el('span', { class: 'quiet' }, `${name} °`), input)));
   // Lengths of what was added.
   const lengths = ['Width', 'Depth', 'Height'].map((label, k) => el('input', {
     type: 'number', min: 0, step: 0.05, 'aria-label': `${label}, metres`, title: `${label}, metres`, change: () => {
@@ -135,7 +146,7 @@ export function thingPanel(app: App): HTMLElement {
   const fixed = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Part of the building, so it stays put.'), button('Let it move', () => app.loosen()));
   const painting = el('div', { class: 'row' }, el('span', { class: 'quiet grow' }, 'Reflectance'), paint, reflectance, el('span', { class: 'unit' }, '%'));
   const copying = el('div', { class: 'row' }, copy, remove);
-  const body = el('div', {}, name, painting, lighting, sizing, moving, fixed, copying);
+  const body = el('div', {}, name, painting, lighting, standing, sizing, moving, fixed, copying);
   const none = el('p', { class: 'quiet' }, 'Click a thing, press Enter for what is under the cross, or P for one after the other.');
 
   const show = () => {
@@ -154,6 +165,11 @@ export function thingPanel(app: App): HTMLElement {
     if (object) {
       if (!isOpen(paint)) paint.value = hex(object.reflectance);
       if (!isOpen(reflectance)) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
+    }
+    standing.hidden = light?.type !== 'directional';
+    if (!standing.hidden) {
+      const now = sun();
+      for (const [angle, , input] of angles) if (!isOpen(input)) input.value = String(Number(((now[angle] * 180) / Math.PI).toFixed(1)));
     }
     const size = object?.form ? sizeOf(object.form) : [];
     sizing.hidden = size.length === 0;
@@ -176,14 +192,13 @@ export function thingPanel(app: App): HTMLElement {
       light.cone?.forEach((angle, k) => put(cone[k], (angle * 180) / Math.PI));
     }
     const spot = app.spot();
-    moving.hidden = !spot;
+    // Parallel light has no place.
+    moving.hidden = !spot || light?.type === 'directional';
     fixed.hidden = !object || spot !== null;
     if (!spot) return;
     const at = app.stage.toScene(spot);
     places.forEach((input, k) => {
       if (!isOpen(input)) input.value = coordinate(at.getComponent(k), 3);
-      // Parallel light has no place.
-      input.disabled = light?.position === null;
     });
     if (!isOpen(turn)) turn.value = String(Math.round(10 * turnOf(placed.matrix, new Vector3(...(app.scene?.up ?? [0, 1, 0])))) / 10);
     mode.set(app.gizmo.mode);
