@@ -5,7 +5,7 @@ import { cover } from './cover';
 import { keep, kept, numberOf, type Curve } from './curve';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
-import { boxAhead, panelAhead, resized } from './forms';
+import { boxAhead, panelAhead, reshaped, type Shaped, tiltOf } from './forms';
 import { follow, lay, open, read, type Grid } from './grid';
 import { beside, lampAhead, raysOf, type Lamp, type LampKind, type Sun } from './lamps';
 import { Marks } from './marks';
@@ -83,6 +83,8 @@ export class App {
   private news = new Set<Topic>();
   /** Where copies will be that were asked for: the first that comes is selected. */
   private awaited: number[][] = [];
+  /** Forms that were asked for and have not come. */
+  private wished = new Map<number, Shaped>();
   /** Which new lamp will be selected. */
   private awaitedLamp: ((light: LightNotice) => boolean) | null = null;
   private loosened = new Set<number>();
@@ -247,11 +249,11 @@ export class App {
       tint: object.tint, emission: object.emission, transmittance: object.transmittance,
       texture: object.texture ? this.texture(object.texture) : null,
     });
-    if (object.form && 'rectangle' in object.form) surface.showBack();
     surface.matrix.fromArray(object.matrix);
     this.stage.moved(surface);
     this.followed(surface);
-    if (object.deleted && this.selected === id) this.mark(null);
+    this.wished.delete(id);
+    if (object.deleted && this.selected === id) this.mark(this.heir(object));
     else if (this.group().includes(surface)) {
       this.marks.outline(this.group());
       this.gizmo.place();
@@ -273,6 +275,13 @@ export class App {
     }
     if (light.deleted && typeof this.layer === 'object' && 'light' in this.layer && this.layer.light === light.id) this.showLayer('total');
     this.tellSoon('lights');
+  }
+
+  /** What something that is gone has become. */
+  private heir({ successor }: ObjectNotice): number | null {
+    if (successor === null) return null;
+    const next = this.objects.get(successor);
+    return next?.deleted ? this.heir(next) : successor;
   }
 
   /** Whether an object is one of the copies that were asked for. */
@@ -311,6 +320,7 @@ export class App {
   private takeBack(): void {
     this.awaited = [];
     this.awaitedLamp = null;
+    this.wished.clear();
     this.objectsAhead.takeBack();
     this.lightsAhead.takeBack();
     for (const topic of ['objects', 'lights', 'selection'] as const) this.tell(topic);
@@ -465,11 +475,6 @@ export class App {
     });
   }
 
-  /** Whether what is selected turns every way: lamps and what was added, while a thing on a floor turns about the zenith. */
-  get isTiltable(): boolean {
-    return this.selectedLight !== null || (this.selected !== null && this.objects.get(this.selected)!.form !== null);
-  }
-
   /** Lets what is selected be moved, though it is part of the building. */
   loosen(): void {
     const object = this.selected === null ? undefined : this.objects.get(this.selected);
@@ -501,7 +506,8 @@ export class App {
     if (edits.length > 0) this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
   }
 
-  /** Moves by a way and turns: by an angle about the zenith, and what can be tilted about the right of who looks. */
+  /** Moves by a way and turns: by an angle about the zenith, and lamps about the right of who looks, what was added about its own
+   *  x axis. */
   nudge(way: Vector3, angle: number, tilt = 0): void {
     const spot = this.spot();
     if (!spot) {
@@ -512,9 +518,10 @@ export class App {
     const motion = new Matrix4().makeTranslation(way.clone().add(spot))
       .multiply(new Matrix4().makeRotationY(angle))
       .multiply(new Matrix4().makeTranslation(spot.clone().negate()));
-    const tilted = this.isTiltable ? motion.multiply(about(spot, right, tilt)) : motion;
-    if (this.selectedLight === null) this.move(tilted);
-    else this.moveLight(this.selectedLight, tilted);
+    const [part] = this.parts();
+    if (this.selectedLight !== null) this.moveLight(this.selectedLight, motion.multiply(about(spot, right, tilt)));
+    else if (!part) this.move(motion);
+    else this.move(motion.multiply(about(this.stage.toWorld(part.matrix.slice(12, 15)), this.axes(part)[0], tilt)));
   }
 
   /** About what the selected thing or lamp turns, in the world; none if it cannot be moved. */
@@ -549,7 +556,7 @@ export class App {
   /** Adds a lamp where it is seen. */
   addLamp(kind = this.lampKind): void {
     if (kind === 'panel') {
-      this.addObject(panelAhead(this.stage, this.navigator.scale, this.newName('Panel')));
+      this.addObjects(panelAhead(this.stage, this.navigator.scale, this.newName('Panel'), (id) => this.objects.get(id)?.form !== null));
       return;
     }
     const light = lampAhead(this.stage, this.navigator.scale, kind, this.newName('Lamp'));
@@ -560,24 +567,40 @@ export class App {
 
   /** Adds a box where it is seen. */
   addBox(): void {
-    this.addObject(boxAhead(this.stage, this.navigator.scale, this.newName('Box')));
+    this.addObjects([boxAhead(this.stage, this.navigator.scale, this.newName('Box'))]);
   }
 
-  private addObject(object: NewObject): void {
-    this.awaited = [object.matrix];
-    this.say(`Added: ${object.name}. It is selected.`);
-    this.edit({ add: { object } });
+  /** Adds what belongs together. */
+  private addObjects(objects: NewObject[]): void {
+    this.awaited = objects.map(({ matrix }) => matrix);
+    this.say(`Added: ${objects[0].name}. It is selected.`);
+    const edits = objects.map((object) => ({ add: { object } }));
+    this.edit(edits.length === 1 ? edits[0] : { several: edits });
   }
 
-  /** Gives what was added other lengths, metres along its axes: it is made anew. */
-  resize(old: ObjectNotice, size: number[]): void {
-    const lamp = [...this.lights.values()].find((light) => light.object === old.id);
-    const object = resized(old, lamp, size);
-    this.awaited = [object.matrix];
-    const edits: Edit[] = [{ delete: { object: old.id } }, { add: { object } }];
-    // Numbers are given in their order.
-    if (lamp) edits.push({ light: { light: Math.max(...this.lights.keys()) + 1, dimming: lamp.dimming, colour: lamp.colour } });
-    this.edit({ several: edits });
+  /** What is selected if it was added, in the forms that were asked for last; nothing else. */
+  parts(): (ObjectNotice & Shaped)[] {
+    const objects = this.group().map(({ object }) => ({ ...this.objects.get(object)!, ...this.wished.get(object) }));
+    return objects.every(({ form }) => form) ? objects : [];
+  }
+
+  /** Gives what is selected, and was added, other lengths, metres. */
+  resize(size: number[]): void {
+    const edits = reshaped(this.parts(), size);
+    for (const edit of edits) if ('reshape' in edit) this.wished.set(edit.reshape.object, edit.reshape);
+    this.edit(edits.length === 1 ? edits[0] : { several: edits });
+  }
+
+  /** By how much what is selected, and was added, is tilted about its own x axis, radians. */
+  tilt(): number {
+    const [part] = this.parts();
+    const [x, , z] = this.axes(part);
+    return tiltOf(part.form!, x, z);
+  }
+
+  /** The axes of something in the world. */
+  private axes({ matrix }: Shaped): Vector3[] {
+    return [0, 4, 8].map((first) => new Vector3().fromArray(matrix, first).applyQuaternion(this.stage.root.quaternion).normalize());
   }
 
   /** The selected lamp without area, if it is one that can be placed. */
@@ -713,8 +736,8 @@ export class App {
       this.tell('probe');
       return;
     }
-    this.probed = hit.isBack ? null : { hit, answer: null };
-    this.marks.point(hit.isBack ? null : hit);
+    this.probed = { hit, answer: null };
+    this.marks.point(hit);
     this.select(hit.surface.object);
     this.askProbe();
     this.tell('probe');

@@ -1,4 +1,4 @@
-// Exposure as the program chooses it for pictures: the median of what is seen at 0.24 of white, the brightest tenth below 0.8.
+// Exposure as the program chooses it for pictures, but that it leaves out what shines by itself: the median of what is seen at 0.24 of white, the brightest tenth below 0.8.
 // It follows the camera, as eyes do. While one looks the same way, changes do not move it: what is dimmed looks darker, and what else
 // is there looks no brighter for it. Only where light becomes so bright that the picture would be white it goes down, and back.
 import type { Stage } from './stage';

@@ -1,57 +1,112 @@
 // Boxes and luminous panels that a person adds, and what they become when they get another size.
 import { DoubleSide, Matrix4, Vector3 } from 'three';
-import { hung, inSight } from './lamps';
+import { clearOf, hung, inSight } from './lamps';
 import type { Stage } from './stage';
-import type { Form, LightNotice, NewObject, ObjectNotice } from './wire';
+import type { Edit, Form, NewObject, ObjectNotice } from './wire';
 
 /** Sides of a box, metres: a stool. */
 const BOX = 0.5;
 
-/** Sides of a panel, metres, and what it gives, lm: one in a ceiling of tiles, as offices have them. */
-const PANEL = 0.6;
+/** Least side of a box, over the extent of the scene: smaller ones could not be seen in it, and far smaller ones are refused. */
+const LEAST = 1e-3;
+
+/** A panel, metres: its sides, its thickness, how far its rim goes around what shines, how far it hangs below the ceiling. As those
+ *  in ceilings of tiles, and what it gives, lm, in rooms that are made for people. */
+const [PANEL, THICK, RIM, BELOW] = [0.6, 0.04, 0.01, 0.05];
 const FLUX = 4000;
+
+/** Metres that what shines stands out of its housing. */
+const OUT = 0.002;
 
 /** Reflectance of what is added. */
 const GREY = 0.5;
+const WHITE = 0.8;
 
-/** Metres along its axes: width and depth, and height of a box. */
-export const sizeOf = (form: Form) => ('box' in form ? form.box.size : form.rectangle.size);
+/** Where panels go when there is one already, in steps of half as much again as its side. */
+const BESIDE = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1], [2, 0], [-2, 0], [0, 2], [0, -2]];
 
-/** Square metres that shine, where it does. */
-function areaOf(form: Form): number {
-  const [x, y, z] = sizeOf(form);
-  return 'box' in form ? 2 * (x * y + y * z + z * x) : x * y;
+const UP = new Vector3(0, 1, 0);
+
+/** Something that was added, as far as its place and form matter. */
+export type Shaped = Pick<ObjectNotice, 'form' | 'matrix'>;
+
+/** Metres along its axes. */
+const lengths = (form: Form) => ('box' in form ? form.box.size : form.rectangle.size);
+
+/** Width and depth, and height of a box, of what belongs together: a panel is as large as its housing. */
+export function sizeOf(parts: Shaped[]): number[] {
+  const [lamp, box] = [parts.find(({ form }) => 'rectangle' in form!), parts.find(({ form }) => 'box' in form!)];
+  const size = lengths((box ?? lamp)!.form!);
+  return size.slice(0, lamp ? 2 : 3);
 }
 
 /** From own axes to the scene's: x and y are level, and z goes up, or down as a lamp shines. */
-function standing(stage: Stage, place: Vector3, isDown: boolean): number[] {
+function standing(stage: Stage, place: Vector3, isDown: boolean): Matrix4 {
   const [x, y, z] = [new Vector3(1, 0, 0), new Vector3(0, 0, isDown ? 1 : -1), new Vector3(0, isDown ? -1 : 1, 0)].map((axis) => stage.toScene(axis));
-  return new Matrix4().makeBasis(x, y, z).setPosition(stage.toScene(place)).toArray();
+  return new Matrix4().makeBasis(x, y, z).setPosition(stage.toScene(place));
 }
 
 /** A box on the floor where who looks sees it. `metre` is as long as a metre is to people who fit into the scene. */
 export function boxAhead(stage: Stage, metre: number, name: string): NewObject {
-  const side = BOX * metre;
+  const side = Math.max(BOX * metre, LEAST * stage.bounds.getSize(new Vector3()).length());
   const place = inSight(stage, metre);
-  const floor = stage.cast(place, new Vector3(0, -1, 0), Infinity, DoubleSide);
+  const floor = stage.cast(place, UP.clone().negate(), Infinity, DoubleSide);
   if (floor) place.y -= floor.distance - 0.5 * side;
-  return { name, form: { box: { size: [side, side, side] } }, reflectance: [GREY, GREY, GREY], matrix: standing(stage, place, false) };
+  return { name, form: { box: { size: [side, side, side] } }, reflectance: [GREY, GREY, GREY], matrix: standing(stage, place, false).toArray() };
 }
 
-/** A panel below the ceiling that shines down. */
-export function panelAhead(stage: Stage, metre: number, name: string): NewObject {
-  const side = PANEL * metre;
-  const form = { rectangle: { size: [side, side] } };
-  const exitance = FLUX / areaOf(form);
-  const matrix = standing(stage, hung(stage, metre, inSight(stage, metre)), true);
-  return { name, form, reflectance: [GREY, GREY, GREY], emission: [exitance, exitance, exitance], matrix };
+/** A panel that shines down from the ceiling above what one looks at, clear of walls and of other things that were added: what
+ *  shines, and its housing. */
+export function panelAhead(stage: Stage, metre: number, name: string, isAdded: (object: number) => boolean): NewObject[] {
+  const side = Math.max(PANEL * metre, LEAST * stage.bounds.getSize(new Vector3()).length());
+  const scale = side / PANEL;
+  const place = onCeiling(stage, side, scale, isAdded) ?? hung(stage, metre, inSight(stage, metre));
+  const matrix = standing(stage, place, true);
+  const shining = side - 2 * RIM * scale;
+  const exitance = (FLUX * scale * scale) / shining ** 2;
+  const behind = new Matrix4().makeTranslation(0, 0, -(OUT + 0.5 * THICK) * scale);
+  return [
+    { name, form: { rectangle: { size: [shining, shining] } }, reflectance: [GREY, GREY, GREY], emission: [exitance, exitance, exitance], matrix: matrix.toArray() },
+    { name, form: { box: { size: [side, side, THICK * scale] } }, reflectance: [WHITE, WHITE, WHITE], matrix: matrix.clone().multiply(behind).toArray() },
+  ];
 }
 
-/** The same with other lengths: a box stands where it stood, and a lamp keeps its lumens. */
-export function resized({ name, form, reflectance, matrix }: ObjectNotice, lamp: LightNotice | undefined, size: number[]): NewObject {
-  const other: Form = 'box' in form! ? { box: { size } } : { rectangle: { size } };
-  const rise = 'box' in form! ? 0.5 * (size[2] - form.box.size[2]) : 0;
-  const raised = new Matrix4().fromArray(matrix).multiply(new Matrix4().makeTranslation(0, 0, rise));
-  const emission = lamp?.flux?.map((flux) => flux / areaOf(other));
-  return { name, form: other, reflectance, ...(emission && { emission }), matrix: raised.toArray() };
+function onCeiling(stage: Stage, side: number, scale: number, isAdded: (object: number) => boolean): Vector3 | null {
+  const hit = stage.pick(0, 0);
+  const from = hit ? hit.point.clone().addScaledVector(hit.normal, BELOW * scale) : inSight(stage, scale);
+  const first = stage.cast(from, UP, Infinity, DoubleSide);
+  if (!first) return null;
+  from.y += Math.max(0.5 * first.distance, first.distance - 2 * BELOW * scale);
+  const level = [new Vector3(1, 0, 0), new Vector3(0, 0, 1)];
+  for (const [x, z] of BESIDE) {
+    const way = new Vector3(1.5 * side * x, 0, 1.5 * side * z);
+    if (way.length() > 0 && stage.cast(from, way.clone().normalize(), way.length() + 0.5 * side, DoubleSide)) continue;
+    const at = clearOf(stage, from.clone().add(way), 0.6 * side, level);
+    const above = (x: number, z: number) => stage.cast(at.clone().add(new Vector3(x * side, 0, z * side)), UP, Infinity, DoubleSide);
+    const ceiling = above(0, 0);
+    const isTaken = [ceiling, ...[-0.5, 0.5].flatMap((x) => [above(x, -0.5), above(x, 0.5)])].some((hit) => hit && isAdded(hit.surface.object));
+    if (ceiling && !isTaken) return at.setY(at.y + ceiling.distance - BELOW * scale);
+  }
+  return null;
+}
+
+/** What gives what belongs together another size: a box stands where it stood, and a panel keeps its rim. */
+export function reshaped(parts: (Shaped & { id: number })[], size: number[]): Edit[] {
+  const lamp = parts.find(({ form }) => 'rectangle' in form!);
+  const old = sizeOf(parts);
+  return parts.map(({ id, form, matrix }) => {
+    const own = lengths(form!);
+    if (!lamp) {
+      const raised = new Matrix4().fromArray(matrix).multiply(new Matrix4().makeTranslation(0, 0, 0.5 * (size[2] - own[2])));
+      return { reshape: { object: id, form: { box: { size } }, matrix: raised.toArray() } };
+    }
+    const [x, y] = [0, 1].map((k) => size[k] - Math.min(old[k] - own[k], 0.5 * size[k]));
+    return { reshape: { object: id, form: 'box' in form! ? { box: { size: [x, y, own[2]] } } : { rectangle: { size: [x, y] } }, matrix } };
+  });
+}
+
+/** By how much something that was added is tilted about its own x axis, radians; its axes are in the world. */
+export function tiltOf(form: Form, x: Vector3, z: Vector3): number {
+  const nominal = 'box' in form ? z : z.clone().negate();
+  return Math.atan2(nominal.dot(x.clone().cross(UP)), nominal.dot(UP));
 }

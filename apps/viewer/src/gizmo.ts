@@ -44,8 +44,9 @@ export class Gizmo {
     this.app.stage.change();
   }
 
+  /** A thing on a floor turns about the zenith; a lamp every way. */
   private offer(): void {
-    this.controls.showX = this.controls.showZ = this.mode === 'translate' || this.app.isTiltable;
+    this.controls.showX = this.controls.showZ = this.mode === 'translate' || this.app.selectedLight !== null;
   }
 
   /** Whether the pointer is on a handle, and so on nothing else. */

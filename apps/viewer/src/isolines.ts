@@ -48,7 +48,7 @@ function along(stage: Stage, level: number, [a, b]: number[], place: (t: number)
     const t = from.t + ((to.t - from.t) * from.log) / (from.log - to.log);
     const [x, y] = place(t);
     const hit = stage.pick(x, y);
-    const log = hit && !hit.isBack ? Math.log(luxAt(hit.surface, hit.triangle, hit.uv) / level) : NaN;
+    const log = hit ? Math.log(luxAt(hit.surface, hit.triangle, hit.uv) / level) : NaN;
     if (hit && Math.abs(log) < NEAR) return hit.point;
     if (!Number.isFinite(log)) return null;
     if (log * from.log > 0) from = { t, log };

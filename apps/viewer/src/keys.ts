@@ -39,7 +39,7 @@ const LIST: [string, [string, string][]][] = [
     [', .', 'turn it'],
     ['Home End', 'tilt the selected lamp, or what was added'],
     ['M', 'handles: move or turn'],
-    ['Insert  Shift+Insert', 'add a lamp, a box'],
+    ['Insert', 'add a lamp; with Shift a box'],
     ['Ctrl+D', 'duplicate'],
     ['Delete', 'delete'],
     ['Ctrl+Z  Ctrl+Y', 'undo, redo'],
@@ -149,7 +149,7 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
   };
   const size = (event: KeyboardEvent) => (event.shiftKey ? 0.1 : 1) * NUDGE * Math.min(1, app.stage.bounds.getSize(new Vector3()).length() / 5);
   const tilt = (by: number) => {
-    if (!app.isTiltable) app.say('Lamps without area can be tilted, and what was added: select one first.');
+    if (app.selectedLight === null && app.parts().length === 0) app.say('Lamps without area can be tilted, and what was added: select one first.');
     else app.nudge(new Vector3(), 0, by);
   };
   const angle = (event: KeyboardEvent) => ((event.shiftKey ? 0.2 : 1) * TURN * Math.PI) / 180;

@@ -117,8 +117,13 @@ function ahead(stage: Stage, metre: number): Vector3 {
 
 /** The place, or one beside it that is farther from what is near, as far as there is room on the other side; in front of who looks. */
 function cleared(stage: Stage, metre: number, place: Vector3): Vector3 {
-  const clear = Math.min(CLEAR * metre, 0.5 * place.distanceTo(stage.camera.position));
-  for (const axis of [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)]) {
+  const axes = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)];
+  return clearOf(stage, place, Math.min(CLEAR * metre, 0.5 * place.distanceTo(stage.camera.position)), axes);
+}
+
+/** The place moved along axes until it is so far from what is near, as far as there is room on the other side. */
+export function clearOf(stage: Stage, place: Vector3, clear: number, axes: Vector3[]): Vector3 {
+  for (const axis of axes) {
     const [up, down] = [axis, axis.clone().negate()].map((way) => stage.cast(place, way, 2 * clear, DoubleSide)?.distance ?? 2 * clear);
     const [near, far] = [Math.min(up, down), Math.max(up, down)];
     const way = Math.min(Math.max(0, clear - near), 0.5 * (far - near));

@@ -1,6 +1,6 @@
 // A line around what is selected: its mask is drawn first, and the line is where the mask ends.
 import {
-  BufferAttribute, BufferGeometry, Color, DoubleSide, GLSL3, type Camera, Mesh, type Scene, ShaderMaterial, Vector2,
+  BufferAttribute, BufferGeometry, Color, GLSL3, type Camera, Mesh, type Scene, ShaderMaterial, Vector2,
   type WebGLRenderer, WebGLRenderTarget,
 } from 'three';
 import { WIDEN } from './border';
@@ -17,8 +17,6 @@ export class Outline {
   readonly line: Mesh<BufferGeometry, ShaderMaterial>;
   private mask = new WebGLRenderTarget(1, 1);
   private white = new ShaderMaterial({
-    // What is seen from behind, too.
-    side: DoubleSide,
     glslVersion: GLSL3,
     uniforms: { pixels: shared.pixels },
     vertexShader: /* glsl */ `

@@ -23,8 +23,6 @@ export interface Hit {
   triangle: number;
   /** Weights of the triangle's corners 1 and 2. */
   uv: [number, number];
-  /** Whether it is a back that has no light of its own. */
-  isBack: boolean;
 }
 
 /** Pixels drawn for one shown, along each side: fewer while something moves and frames take long. */
@@ -296,10 +294,9 @@ export class Stage {
       const distance = point.distanceTo(origin);
       if (distance >= reach) continue;
       const normal = found.face.normal.clone().transformDirection(surface.matrixWorld);
-      const isBack = normal.dot(direction) > 0;
-      if (isBack) normal.negate();
+      if (normal.dot(direction) > 0) normal.negate();
       const triangle = found.faceIndex!;
-      best = { surface, point, normal, distance, triangle, uv: barycentric(surface, triangle, found.point), isBack };
+      best = { surface, point, normal, distance, triangle, uv: barycentric(surface, triangle, found.point) };
     }
     return best;
   }

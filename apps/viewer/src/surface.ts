@@ -1,6 +1,6 @@
 // A surface as the eye sees it, or as a meter does: light at vertices times reflectance at pixels.
 import {
-  BackSide, BufferAttribute, BufferGeometry, DoubleSide, Float16BufferAttribute, FrontSide, Mesh, MeshBasicMaterial, type Texture, Vector2, Vector3,
+  BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, Mesh, MeshBasicMaterial, type Texture, Vector2, Vector3,
   type IUniform,
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
@@ -120,7 +120,8 @@ export const FRAGMENT = /* glsl */ `
       luminance += vThrough * 0.31830988618;
     #endif
     if (mode == ${Mode.Meter}) {
-      outColour = vec4(dot(luminance, LUMINANCE), lux, 0.0, 1.0);
+      // Lamps that fill the picture would leave their room black.
+      outColour = vec4(dot(luminance - emission * emissionShown, LUMINANCE), lux, 0.0, 1.0);
       return;
     }
     vec3 colour = mode == ${Mode.Lux} ? falseColour(lux) : display(luminance, exposure);
@@ -158,10 +159,6 @@ export interface Look {
 
 /** What rays take the side from; the stage draws surfaces together, with a material of their own. */
 const PLAIN = new MeshBasicMaterial({ side: FrontSide });
-const THIN = new MeshBasicMaterial({ side: DoubleSide });
-
-/** A back that gives no light back. */
-const BLACK = new MeshBasicMaterial({ color: 0, side: BackSide });
 
 /** Backs follow the fronts, with corners 1 and 2 exchanged. */
 function countFronts({ positions, indices }: MeshFrame): number {
@@ -201,14 +198,6 @@ export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
   /** Whether light passes through. */
   get isSheet(): boolean {
     return this.look.transmittance.some((tau) => tau > 0);
-  }
-
-  /** Shows its back, black as it is for light: files leave out backs that nobody sees, but what a person adds may be seen from
-   *  everywhere. */
-  showBack(): void {
-    if (this.material === THIN) return;
-    this.material = THIN;
-    this.add(new Mesh(this.geometry, BLACK));
   }
 
   /** For each vertex that on the other side: elements of backs follow those of the fronts, with corners 1 and 2 exchanged. */

@@ -45,7 +45,7 @@ export function tests(app: App) {
         const pick = (i: number, j: number) => stage.pick((2 * (column + i + 0.5)) / width - 1, (2 * (row + j + 0.5)) / height - 1);
         const hit = pick(0, 0);
         const around = [[-2, -2], [-2, 2], [2, -2], [2, 2]].map(([i, j]) => pick(i, j));
-        if (!hit || hit.isBack || around.some((other) => other?.surface !== hit.surface || other.normal.dot(hit.normal) < 0.999)) return null;
+        if (!hit || around.some((other) => other?.surface !== hit.surface || other.normal.dot(hit.normal) < 0.999)) return null;
         const { tint, emission, transmittance, texture } = hit.surface.look;
         const paint = hit.surface.geometry.attributes.paint.array;
         return {

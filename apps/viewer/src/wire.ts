@@ -50,6 +50,8 @@ export interface ObjectNotice {
   movable: boolean;
   /** Of what was added, in the axes that the matrix carries from; none of what the file has. */
   form: Form | null;
+  /** What it became when it got another form. */
+  successor: number | null;
 }
 
 /** A form about its middle, metres: a box along x, y and z, or a rectangle along x and y whose front is that of +z. */
@@ -204,6 +206,7 @@ export type Edit =
   | { copy_light: { light: number; matrix: number[] } }
   | { delete_light: { light: number } }
   | { add: { object: NewObject } }
+  | { reshape: { object: number; form: Form; matrix: number[] } }
   | { copy: { object: number; matrix: number[] } }
   | { delete: { object: number } }
   | { several: Edit[] };

@@ -105,7 +105,7 @@ impl Dice {
         let light = LightId(self.below(model.lights.len()) as u32);
         // Of lights without area, as most are refused to others.
         let lamp = model.lights.iter().rfind(|light| light.intensity.is_some()).map_or(light, |light| light.id);
-        match self.below(15) {
+        match self.below(17) {
             0 | 1 => Edit::Light {
                 light,
                 dimming: if self.below(4) == 0 { 0.0 } else { self.between(0.0, 2.0) as f32 },
@@ -125,7 +125,14 @@ impl Dice {
                 let intensity = [self.between(0.0, 100.0) as f32, 40.0, 0.0];
                 Edit::ChangeLight { light: lamp, kind: self.kind(), intensity }
             }
-            12 | 13 => Edit::Add { object: Box::new(self.object(reach)) },
+            12 | 13 => match model.objects.iter().rfind(|object| object.form.is_some()) {
+                Some(added) => {
+                    let NewObject { form, matrix, .. } = self.object(reach);
+                    Edit::Reshape { object: added.id, form, matrix }
+                }
+                None => Edit::Delete { object },
+            },
+            14 | 15 => Edit::Add { object: Box::new(self.object(reach)) },
             _ => match model.objects.iter().find(|object| object.deleted) {
                 Some(deleted) if self.below(2) == 0 => Edit::Restore { object: deleted.id },
                 _ => Edit::Delete { object },
@@ -384,6 +391,63 @@ fn catalogue_77_what_is_added_is_as_if_it_had_always_been_there() {
     finish(&mut session);
     assert!(bits(&session)[..before.len()] == before[..]);
     assert_ne!(now[..before.len()], before[..]);
+}
+
+/// A lamp gets another form twice, each time by the id that it had at first: it is the same lamp with as many lumens, at once the
+/// light of a lamp that was added so, and taken back to the last bit.
+#[test]
+fn catalogue_77_what_gets_another_form_stays_what_it_is() {
+    let down = glam::DMat4::from_translation(glam::DVec3::new(0.3, 0.45, 0.25))
+        * glam::DMat4::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let panel = NewObject {
+        name: "panel".to_owned(),
+        form: Form::Rectangle { size: [0.2, 0.1] },
+        reflectance: [0.5; 3],
+        emission: [30.0, 40.0, 50.0],
+        matrix: down.to_cols_array(),
+    };
+    let mut session = Session::new(cornell_box(), &small()).unwrap();
+    let added = session.apply(&Edit::Add { object: Box::new(panel.clone()) }).unwrap();
+    let (id, lamp) = (added.added[0], added.added_lights[0]);
+    session.apply(&Edit::Light { light: lamp, dimming: 0.5, colour: [1.0, 0.5, 1.0] }).unwrap();
+    session.apply(&Edit::Reflectance { object: id, reflectance: [0.1, 0.2, 0.3] }).unwrap();
+    finish(&mut session);
+    let before = bits(&session);
+    let lumens = |session: &Session| session.model().lights[lamp.0 as usize].flux.unwrap();
+    let flux = lumens(&session);
+    let reshape = |size: [f64; 2]| Edit::Reshape { object: id, form: Form::Rectangle { size }, matrix: panel.matrix };
+    let inverse = [[0.3, 0.05], [0.15, 0.15]].map(|size| session.apply(&reshape(size)).unwrap().inverse);
+    let model = session.model();
+    let now = ObjectId(id.0 + 2);
+    let own = &model.lights[lamp.0 as usize];
+    assert_eq!((own.object, own.dimming, own.colour, own.deleted), (Some(now), 0.5, [1.0, 0.5, 1.0], false));
+    let [old, middle, new] = [0, 1, 2].map(|k| &model.objects[(id.0 + k) as usize]);
+    assert_eq!([old.deleted, middle.deleted, new.deleted], [true, true, false]);
+    assert_eq!([old.successor, middle.successor, new.successor], [Some(ObjectId(id.0 + 1)), Some(now), None]);
+    assert_eq!((new.reflectance, new.group, new.light), ([0.1, 0.2, 0.3], old.group, Some(lamp)));
+    for (a, b) in lumens(&session).into_iter().zip(flux) {
+        assert!((a / b - 1.0).abs() < 1e-5, "{a} lm instead of {b}");
+    }
+    // By its first id it is painted and moved.
+    session.apply(&Edit::Reflectance { object: id, reflectance: [0.3; 3] }).unwrap();
+    assert_eq!(session.model().objects[now.0 as usize].reflectance, [0.3; 3]);
+    let back = session.apply(&Edit::Delete { object: id }).unwrap().inverse;
+    assert_eq!(back, Edit::Restore { object: now });
+    assert_eq!(session.apply(&reshape([0.1; 2])), Err(EditError::Deleted(id)));
+    session.apply(&back).unwrap();
+    session.apply(&Edit::Reflectance { object: id, reflectance: [0.1, 0.2, 0.3] }).unwrap();
+
+    let [first, second] = &inverse;
+    assert!(matches!(session.apply(first), Err(EditError::NotExchanged { .. })), "in their order only");
+    let again = [second, first].map(|edit| session.apply(edit).unwrap().inverse);
+    finish(&mut session);
+    assert!(bits(&session)[..before.len()] == before[..]);
+    let [second, first] = &again;
+    [first, second].into_iter().for_each(|edit| drop(session.apply(edit).unwrap()));
+    assert_eq!(session.model().lights[lamp.0 as usize].object, Some(now));
+    let of_file = Edit::Reshape { object: ObjectId(0), form: panel.form, matrix: panel.matrix };
+    assert!(matches!(session.apply(&of_file), Err(EditError::Form { .. })));
+    assert!(matches!(session.apply(&reshape([0.0, 1.0])), Err(EditError::Form { .. })));
 }
 
 /// What no object can be is refused, with nothing changed.

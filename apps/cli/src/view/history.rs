@@ -76,6 +76,7 @@ impl History {
 pub enum Target {
     Paint(ObjectId),
     Place(ObjectId),
+    Shape(ObjectId),
     Presence(ObjectId),
     Light(LightId),
     LightPlace(LightId),
@@ -98,6 +99,7 @@ pub fn targets(edit: &Edit) -> Vec<Target> {
         }
         Edit::Reflectance { object, .. } => vec![Target::Paint(*object)],
         Edit::Move { object, .. } => vec![Target::Place(*object)],
+        Edit::Reshape { object, .. } | Edit::Exchange { gone: object, .. } => vec![Target::Shape(*object)],
         Edit::Copy { object, .. } | Edit::Delete { object } | Edit::Restore { object } => {
             vec![Target::Presence(*object)]
         }
@@ -122,13 +124,10 @@ pub fn label(edit: &Edit, model: &Model) -> String {
         Edit::RestoreLight { light: id } => format!("restore {}", light(id)),
         Edit::Reflectance { object: id, .. } => format!("paint {}", object(id)),
         Edit::Move { object: id, .. } => format!("move {}", object(id)),
+        Edit::Reshape { object: id, .. } | Edit::Exchange { gone: id, .. } => format!("resize {}", object(id)),
         Edit::Copy { object: id, .. } => format!("duplicate {}", object(id)),
         Edit::Delete { object: id } => format!("delete {}", object(id)),
         Edit::Restore { object: id } => format!("restore {}", object(id)),
-        // What gets another form is another object.
-        Edit::Several(edits) if let [Edit::Delete { object: id }, Edit::Add { .. }, ..] = edits.as_slice() => {
-            format!("resize {}", object(id))
-        }
         Edit::Several(edits) => edits.first().map_or_else(String::new, |first| label(first, model)),
     }
 }
@@ -144,6 +143,7 @@ pub fn refusal(error: &EditError, model: &Model) -> String {
         | EditError::LightNotDeleted(light) => (format!("light {}", light.0), light_name(*light, model)),
         EditError::Reflectance { object, .. }
         | EditError::TooFar { object, .. }
+        | EditError::Form { object, .. }
         | EditError::Deleted(object)
         | EditError::NotDeleted(object) => (format!("object {}", object.0), object_name(*object, model)),
         _ => return text,

@@ -124,6 +124,8 @@ pub enum Say<'a> {
         movable: bool,
         /// Of what was added.
         form: Option<Form>,
+        /// What it became.
+        successor: Option<ObjectId>,
     },
     Light {
         id: LightId,
@@ -307,6 +309,7 @@ pub fn object(object: &ModelObject, scene: &Scene) -> String {
         deleted: object.deleted,
         movable: object.movable,
         form: object.form,
+        successor: object.successor,
     }
     .text()
 }

@@ -17,7 +17,7 @@ export function lightsPanel(app: App): HTMLElement {
   const kind = el('select', {
     id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind | 'panel'; },
   }, ...[...LAMPS, ['panel', 'Panel']].map(([value, text]) => el('option', { value }, text)));
-  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp in the middle of the picture: 1000 lm, a panel 4000 lm, parallel light 10 000 lx' }));
+  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp where you look: 1000 lm, a panel of 4000 lm on the ceiling above, parallel light of 10 000 lx' }));
   app.on('lights', () => {
     for (const light of app.lights.values()) {
       const old = rows.get(light.id);
@@ -59,14 +59,18 @@ function row(app: App, id: number): Row {
     type: 'checkbox', role: 'switch', 'aria-label': `${name} on`,
     change: () => app.setLight(light(), { dimming: on.checked ? last || 1 : 0 }),
   });
-  const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%' }, (value, isLast) => {
+  const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%', least: 0, most: 100 * MOST_DIMMING }, (value, isLast) => {
     app.setLight(light(), { dimming: within(value / 100) }, during(isLast));
   });
   // Daylight is known by its lux, and what shines by its lumens.
   const [what, unit] = { sky: ['On open ground', 'lx'], object: ['All its light', 'lm'] }[light().type as string] ?? ['Across its rays', 'lx'];
   const amount = el('input', {
     type: 'number', min: 0, step: 'any', 'aria-label': unit === 'lm' ? `Luminous flux of ${name}, lumens` : `Illuminance by ${name}, lux`,
-    change: () => app.setLight(light(), { dimming: within(amount.valueAsNumber / undimmed(light())) }),
+    change: () => {
+      app.setLight(light(), { dimming: within(amount.valueAsNumber / undimmed(light())) });
+      // What is too much is as much as there can be.
+      app.tell('lights');
+    },
   });
   const absolute = el('label', { class: 'slider' },
     el('span', { class: 'quiet grow' }, what),

@@ -63,7 +63,7 @@ export function section(id: string, title: string, open: boolean, ...children: C
 /** A slider with a number beside it. */
 export function slider(
   label: string,
-  { min, max, step, unit = '' }: { min: number; max: number; step: number; unit?: string },
+  { min, max, step, unit = '', least = -Infinity, most = Infinity }: { min: number; max: number; step: number; unit?: string; least?: number; most?: number },
   act: (value: number, isLast: boolean) => void,
 ): HTMLDivElement & { set(value: number): void } {
   const range = el('input', { type: 'range', min, max, step, 'aria-label': label, input: () => give(range, false), change: () => give(range, true) });
@@ -76,7 +76,8 @@ export function slider(
     range.style.setProperty('--share', `${share}%`);
   };
   const give = (input: HTMLInputElement, isLast: boolean) => {
-    const value = input.valueAsNumber;
+    // What the slider does not show may be written.
+    const value = Math.min(most, Math.max(least, input.valueAsNumber));
     act(value, isLast);
     set(value);
   };

@@ -101,15 +101,19 @@ export function thingPanel(app: App): HTMLElement {
   // Lengths of what was added.
   const lengths = ['Width', 'Depth', 'Height'].map((label, k) => el('input', {
     type: 'number', min: 0, step: 0.05, 'aria-label': `${label}, metres`, title: `${label}, metres`, change: () => {
-      const object = app.selected === null ? undefined : app.objects.get(app.selected);
-      if (!object?.form) return;
-      const size = [...sizeOf(object.form)];
+      const size = sizeOf(app.parts());
       size[k] = lengths[k].valueAsNumber;
-      if (size[k] > 0) app.resize(object, size);
-      else show();
+      if (size[k] > 0) return app.resize(size);
+      app.say('A length is more than nothing: it is as before.');
+      show();
     },
   }));
-  const sizing = el('div', { class: 'numbers' }, ...lengths.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'WDH'[k]), input)));
+  const tilt = el('input', {
+    type: 'number', step: 5, 'aria-label': 'Tilt about its own width, degrees', title: 'Tilt about its own width, degrees',
+    change: () => (Number.isFinite(tilt.valueAsNumber) ? app.nudge(new Vector3(), 0, (tilt.valueAsNumber * Math.PI) / 180 - app.tilt()) : show()),
+  });
+  const sizing = el('div', { class: 'numbers' }, ...lengths.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'WDH'[k]), input)),
+    el('label', {}, el('span', { class: 'quiet' }, 'Tilt °'), tilt));
   /** The thing or the lamp that is selected. */
   const chosen = () => (app.selectedLight !== null ? app.lights.get(app.selectedLight) : app.selected !== null ? app.objects.get(app.selected) : undefined);
 
@@ -171,8 +175,10 @@ export function thingPanel(app: App): HTMLElement {
       const now = sun();
       for (const [angle, , input] of angles) if (!isOpen(input)) input.value = String(Number(((now[angle] * 180) / Math.PI).toFixed(1)));
     }
-    const size = object?.form ? sizeOf(object.form) : [];
+    const parts = app.parts();
+    const size = parts.length > 0 ? sizeOf(parts) : [];
     sizing.hidden = size.length === 0;
+    if (!sizing.hidden && !isOpen(tilt)) tilt.value = String(Math.round((1800 * app.tilt()) / Math.PI) / 10 || 0);
     lengths.forEach((input, k) => {
       input.parentElement!.hidden = k >= size.length;
       if (!isOpen(input) && k < size.length) input.value = String(Number(size[k].toPrecision(4)));

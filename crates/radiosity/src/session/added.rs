@@ -33,7 +33,27 @@ pub enum Form {
     },
 }
 
+/// What is wrong with lengths.
+const LENGTHS: &str = "its lengths are no numbers, negative, or below a ten thousandth of half the scene's extent";
+
 impl Form {
+    /// What is wrong with it in a scene of half such an extent, metres.
+    pub fn fault(&self, half: f64) -> Option<&'static str> {
+        // Written so that what is no number is refused, too.
+        let is_sound = |length: &f64| (LEAST_LENGTH * half..f64::INFINITY).contains(length);
+        (!self.lengths().iter().all(is_sound)).then_some(LENGTHS)
+    }
+
+    /// Elements that it is cut into.
+    pub fn elements(&self, size: f64) -> usize {
+        self.triangles().into_iter().map(|corners| (division_of(corners, size) as usize).pow(2)).sum()
+    }
+
+    /// Its area, m².
+    pub fn area(&self) -> f64 {
+        self.triangles().into_iter().map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum()
+    }
+
     /// Metres along its axes.
     fn lengths(&self) -> &[f64] {
         match self {
@@ -91,16 +111,13 @@ impl NewObject {
             return Some("its name is longer than 200 letters");
         }
         // Written so that what is no number is refused, too.
-        if !self.form.lengths().iter().all(|length| (LEAST_LENGTH * half..f64::INFINITY).contains(length)) {
-            return Some("its lengths are no numbers, negative, or below a ten thousandth of half the scene's extent");
-        }
         if !self.reflectance.iter().all(|rho| (0.0..=MAX_REFLECTANCE).contains(rho)) {
             return Some("its reflectance is not within 0 and 0.99");
         }
         if !self.emission.iter().all(|exitance| (0.0..=MOST_EXITANCE).contains(exitance)) {
             return Some("its emission is negative, above 1e12 lm/m² or no number");
         }
-        None
+        self.form.fault(half)
     }
 
     /// Whether it is a lamp.
@@ -108,22 +125,22 @@ impl NewObject {
         self.emission.iter().any(|exitance| *exitance > 0.0)
     }
 
-    /// Elements that it is cut into.
-    pub fn elements(&self, size: f64) -> usize {
-        self.form.triangles().into_iter().map(|corners| (division_of(corners, size) as usize).pow(2)).sum()
-    }
-
-    /// Puts it last into a scene, in its own axes; answers its number.
-    pub fn add_to(&self, scene: &mut Scene) -> usize {
+    /// Its material.
+    pub fn material(&self) -> Material {
         let [r, g, b] = self.reflectance;
-        scene.materials.push(Material {
+        Material {
             name: self.name.clone(),
             base_color: [r, g, b, 1.0],
             emissive: self.emission.map(|exitance| exitance / PI),
             ..Material::default()
-        });
-        scene.add_triangles(&self.name, scene.materials.len() - 1, &self.form.triangles())
+        }
     }
+}
+
+/// Puts a form last into a scene, in its own axes; answers its number.
+pub fn add_to(scene: &mut Scene, name: &str, material: Material, form: &Form) -> usize {
+    scene.materials.push(material);
+    scene.add_triangles(name, scene.materials.len() - 1, &form.triangles())
 }
 
 #[cfg(test)]

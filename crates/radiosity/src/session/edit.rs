@@ -1,6 +1,6 @@
 //! What may be changed in a scene that is being watched, and why a change is refused.
 
-use crate::session::{LightId, NewObject, ObjectId};
+use crate::session::{Form, LightId, NewObject, ObjectId};
 use radiosity_scene::{Bands, PointLightKind};
 use serde::{Deserialize, Serialize};
 
@@ -111,6 +111,23 @@ pub enum Edit {
         /// The object.
         object: Box<NewObject>,
     },
+    /// Gives an object that was added another form, and a lamp as many lumens as it had. It becomes another, which gets the
+    /// next free id ([`Applied::added`]): edits of the old one are edits of it from now on.
+    Reshape {
+        /// The object.
+        object: ObjectId,
+        /// What it becomes.
+        form: Form,
+        /// From its own axes to the world.
+        matrix: [f64; 16],
+    },
+    /// Takes [`Edit::Reshape`] back, or makes it again: an object is again what it was before it became another.
+    Exchange {
+        /// The object that is there.
+        gone: ObjectId,
+        /// The one that became it.
+        back: ObjectId,
+    },
     /// Adds a copy of an object, which gets the next free id ([`Applied::added`]).
     Copy {
         /// The object that is copied, as it is now.
@@ -214,6 +231,22 @@ pub enum EditError {
     /// The light is there.
     #[error("light {} has not been deleted", .0.0)]
     LightNotDeleted(LightId),
+    /// An object that cannot get another form.
+    #[error("object {} cannot have this form: {why}", object.0)]
+    Form {
+        /// The object.
+        object: ObjectId,
+        /// What is wrong.
+        why: &'static str,
+    },
+    /// An object that is not what another became.
+    #[error("object {} did not become object {}", back.0, gone.0)]
+    NotExchanged {
+        /// The object that is there.
+        gone: ObjectId,
+        /// The other.
+        back: ObjectId,
+    },
     /// An object that cannot be added.
     #[error("the object cannot be added: {0}")]
     NewObject(&'static str),

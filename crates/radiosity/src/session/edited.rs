@@ -1,13 +1,13 @@
 //! Edits are checked as a whole, then carried out; and the scene as they leave it.
 
-use super::added::LONGEST_NAME;
+use super::added::{LONGEST_NAME, add_to};
 use super::edit::{Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
 use super::light::{Light, distance, kind_of};
 use super::paint::brighter;
-use super::{LightId, MOST_COLUMNS, ObjectId, Placed, Session, bytes};
+use super::{Form, LightId, MOST_COLUMNS, ObjectId, Placed, Session, bytes};
 use glam::{DAffine3, DMat4, DVec3};
 use radiosity_scene::material::MAX_REFLECTANCE;
-use radiosity_scene::{Bands, PointLight, PointLightKind, Scene, Sky, Source};
+use radiosity_scene::{Bands, Material, PointLight, PointLightKind, Scene, Sky, Source};
 use radiosity_transport::live::{REACH, World};
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -27,6 +27,8 @@ pub struct Done {
     pub dimmed: BTreeSet<usize>,
     /// The groups of copies by those of their originals.
     pub groups: BTreeMap<u32, u32>,
+    /// The group of what is added.
+    pub added_group: Option<u32>,
     pub repaints: bool,
     pub traces: bool,
 }
@@ -35,6 +37,7 @@ pub struct Done {
 struct Known {
     present: Vec<bool>,
     origin: Vec<Origin>,
+    successor: Vec<Option<usize>>,
     lights: Vec<KnownLight>,
     elements: usize,
 }
@@ -46,6 +49,29 @@ enum Origin {
     Body(usize),
     /// One that the series adds: its corners in its own axes, its elements, whether it shines.
     New(Rc<[DVec3]>, usize, bool),
+}
+
+impl Known {
+    /// What an object is by now.
+    fn now(&self, object: ObjectId) -> usize {
+        latest(object, |index| self.successor.get(index).copied().flatten())
+    }
+}
+
+impl Origin {
+    fn of_form(form: &Form, world: &World, shines: bool) -> Origin {
+        let corners = form.triangles().into_iter().flatten().collect();
+        Origin::New(corners, form.elements(world.element_size()), shines)
+    }
+}
+
+/// What an object has become, as often as it was given another form.
+fn latest(object: ObjectId, successor: impl Fn(usize) -> Option<usize>) -> usize {
+    let mut index = object.0 as usize;
+    while let Some(next) = successor(index) {
+        index = next;
+    }
+    index
 }
 
 #[derive(Clone, Copy)]
@@ -87,6 +113,7 @@ impl Session {
         let mut known = Known {
             present: bodies.iter().map(|body| body.is_present).collect(),
             origin: (0..bodies.len()).map(Origin::Body).collect(),
+            successor: self.objects.iter().map(|object| object.successor).collect(),
             lights: self
                 .lights
                 .iter()
@@ -105,10 +132,13 @@ impl Session {
     }
 
     fn check_one(&self, edit: &Edit, known: &mut Known) -> Result<(), EditError> {
-        let there = |object: ObjectId, known: &Known| match known.present.get(object.0 as usize) {
-            None => Err(EditError::UnknownObject(object)),
-            Some(false) => Err(EditError::Deleted(object)),
-            Some(true) => Ok(known.origin[object.0 as usize].clone()),
+        let there = |object: ObjectId, known: &Known| {
+            let now = known.now(object);
+            match known.present.get(now) {
+                None => Err(EditError::UnknownObject(object)),
+                Some(false) => Err(EditError::Deleted(object)),
+                Some(true) => Ok((now, known.origin[now].clone())),
+            }
         };
         // A light without area, and whether it is gone.
         let placeable = |light: LightId, known: &Known| match known.lights.get(light.0 as usize) {
@@ -141,7 +171,7 @@ impl Session {
                 }
             }
             Edit::Move { object, matrix } => {
-                let origin = there(*object, known)?;
+                let (_, origin) = there(*object, known)?;
                 self.check_place(*object, &origin, matrix)?;
             }
             Edit::MoveLight { light, matrix } => {
@@ -179,7 +209,7 @@ impl Session {
                 known.lights[light.0 as usize].is_gone = false;
             }
             Edit::Copy { object, matrix } => {
-                let origin = there(*object, known)?;
+                let (_, origin) = there(*object, known)?;
                 self.check_place(*object, &origin, matrix)?;
                 self.check_object(origin, known)?;
             }
@@ -187,20 +217,49 @@ impl Session {
                 if let Some(why) = object.fault(world.half) {
                     return Err(EditError::NewObject(why));
                 }
-                let corners = object.form.triangles().into_iter().flatten().collect();
-                let origin = Origin::New(corners, object.elements(world.element_size()), object.shines());
+                let origin = Origin::of_form(&object.form, world, object.shines());
                 self.check_place(ObjectId(known.present.len() as u32), &origin, &object.matrix)?;
                 self.check_object(origin, known)?;
             }
-            Edit::Delete { object } => {
-                there(*object, known)?;
-                known.present[object.0 as usize] = false;
+            Edit::Reshape { object, form, matrix } => {
+                let (now, origin) = there(*object, known)?;
+                let was_added = match origin {
+                    Origin::Body(body) => self.objects[body].form.is_some(),
+                    Origin::New(..) => true,
+                };
+                let fault = if was_added { form.fault(world.half) } else { Some("it is of the file") };
+                if let Some(why) = fault {
+                    return Err(EditError::Form { object: *object, why });
+                }
+                // Its light goes on.
+                let origin = Origin::of_form(form, world, false);
+                self.check_place(*object, &origin, matrix)?;
+                known.successor[now] = Some(known.present.len());
+                known.present[now] = false;
+                self.check_object(origin, known)?;
             }
-            Edit::Restore { object } => match known.present.get_mut(object.0 as usize) {
-                None => return Err(EditError::UnknownObject(*object)),
-                Some(true) => return Err(EditError::NotDeleted(*object)),
-                Some(present) => *present = true,
-            },
+            Edit::Exchange { gone, back } => {
+                let (gone_now, back_now) = (gone.0 as usize, back.0 as usize);
+                let became = known.successor.get(back_now).copied().flatten();
+                if became != Some(gone_now) || known.successor[gone_now].is_some() {
+                    return Err(EditError::NotExchanged { gone: *gone, back: *back });
+                }
+                there(*gone, known)?;
+                (known.successor[back_now], known.successor[gone_now]) = (None, Some(back_now));
+                (known.present[back_now], known.present[gone_now]) = (true, false);
+            }
+            Edit::Delete { object } => {
+                let (now, _) = there(*object, known)?;
+                known.present[now] = false;
+            }
+            Edit::Restore { object } => {
+                let now = known.now(*object);
+                match known.present.get_mut(now) {
+                    None => return Err(EditError::UnknownObject(*object)),
+                    Some(true) => return Err(EditError::NotDeleted(*object)),
+                    Some(present) => *present = true,
+                }
+            }
             Edit::Several(edits) => {
                 if edits.is_empty() {
                     return Err(EditError::NoEdits);
@@ -223,6 +282,7 @@ impl Session {
         };
         known.present.push(true);
         known.origin.push(origin);
+        known.successor.push(None);
         self.check_more(known, elements + 1, shines.then_some(KnownLight { is_gone: false, lamp: None }))
     }
 
@@ -288,19 +348,20 @@ impl Session {
                 inverse
             }
             Edit::Reflectance { object, reflectance } => {
-                let own = &mut self.objects[object.0 as usize];
+                let index = self.now(*object);
+                let own = &mut self.objects[index];
                 let before = own.coat.unwrap_or(own.paint.mean);
                 own.coat = (*reflectance != own.paint.mean).then_some(*reflectance);
-                done.objects.insert(object.0 as usize);
+                done.objects.insert(index);
                 done.repaints = true;
-                Edit::Reflectance { object: *object, reflectance: before }
+                Edit::Reflectance { object: id(index), reflectance: before }
             }
             Edit::Move { object, matrix } => {
-                let index = object.0 as usize;
+                let index = self.now(*object);
                 let before = std::mem::replace(&mut self.objects[index].matrix, *matrix);
                 self.live.place(index, affine(matrix));
                 self.touch(index, done);
-                Edit::Move { object: *object, matrix: before }
+                Edit::Move { object: id(index), matrix: before }
             }
             Edit::MoveLight { light, matrix } => {
                 let own = &mut self.lights[light.0 as usize];
@@ -345,8 +406,9 @@ impl Session {
                 Edit::DeleteLight { light: *light }
             }
             Edit::Copy { object, matrix } => {
-                let original = self.objects[object.0 as usize].clone();
-                let added = self.live.copy(object.0 as usize, affine(matrix));
+                let copied = self.now(*object);
+                let original = self.objects[copied].clone();
+                let added = self.live.copy(copied, affine(matrix));
                 let light = original.light.map(|light| Light { body: Some(added), ..self.lights[light].clone() });
                 // Copies of what belongs together, made together, belong together.
                 let new = self.next_group();
@@ -354,26 +416,47 @@ impl Session {
                 self.put_object(Placed { matrix: *matrix, light: None, group, ..original }, light, done)
             }
             Edit::Add { object } => {
-                let mut source = 0;
-                let make = |scene: &mut Scene| {
-                    source = object.add_to(scene);
-                    source
+                let placed = self.make(&object.name, object.material(), object.form, object.matrix);
+                let light = Light::of_body(&self.live, self.objects.len(), &object.name, self.mean_exitance);
+                // What is added together belongs together.
+                let new = self.next_group();
+                let group = *done.added_group.get_or_insert(new);
+                self.put_object(Placed { group, ..placed }, light, done)
+            }
+            Edit::Reshape { object, form, matrix } => {
+                let old = self.now(*object);
+                let Placed { source, form: before, coat, group, .. } = self.objects[old].clone();
+                let (name, material) = {
+                    let object = &self.scene().objects[source];
+                    (object.name.clone(), self.scene().materials[object.material].clone())
                 };
-                let added = self.live.add_new(make, affine(&object.matrix));
-                let light = Light::of_body(&self.live, added, &object.name, self.mean_exitance);
-                let placed = Placed::new(&self.live, source, added, self.next_group());
-                self.put_object(Placed { matrix: object.matrix, form: Some(object.form), ..placed }, light, done)
+                // As many lumens as before.
+                let share = before.map_or(1.0, |before| before.area() / form.area()) as f32;
+                let material = Material { emissive: material.emissive.map(|emissive| share * emissive), ..material };
+                let placed = self.make(&name, material, *form, *matrix);
+                let new = self.objects.len();
+                self.put_object(Placed { coat, group, ..placed }, None, done);
+                self.succeed(old, new, done);
+                Edit::Exchange { gone: id(new), back: id(old) }
+            }
+            Edit::Exchange { gone, back } => {
+                let index = back.0 as usize;
+                self.live.place(index, affine(&self.objects[index].matrix));
+                self.succeed(gone.0 as usize, index, done);
+                self.touch(index, done);
+                Edit::Exchange { gone: *back, back: *gone }
             }
             Edit::Delete { object } => {
-                self.live.remove(object.0 as usize);
-                self.touch(object.0 as usize, done);
-                Edit::Restore { object: *object }
+                let index = self.now(*object);
+                self.live.remove(index);
+                self.touch(index, done);
+                Edit::Restore { object: id(index) }
             }
             Edit::Restore { object } => {
-                let index = object.0 as usize;
+                let index = self.now(*object);
                 self.live.place(index, affine(&self.objects[index].matrix));
                 self.touch(index, done);
-                Edit::Delete { object: *object }
+                Edit::Delete { object: id(index) }
             }
             Edit::Several(edits) => {
                 let mut inverse: Vec<Edit> = edits.iter().map(|edit| self.carry_out(edit, done)).collect();
@@ -398,7 +481,30 @@ impl Session {
         }
         done.added.push(index);
         self.touch(index, done);
-        Edit::Delete { object: ObjectId(index as u32) }
+        Edit::Delete { object: id(index) }
+    }
+
+    /// What an object is by now.
+    fn now(&self, object: ObjectId) -> usize {
+        latest(object, |index| self.objects.get(index).and_then(|placed| placed.successor))
+    }
+
+    /// Puts a form into the world.
+    fn make(&mut self, name: &str, material: Material, form: Form, matrix: [f64; 16]) -> Placed {
+        let source = self.scene().objects.len();
+        let body = self.live.add_new(|scene| add_to(scene, name, material, &form), affine(&matrix));
+        Placed { matrix, form: Some(form), ..Placed::new(&self.live, source, body, 0) }
+    }
+
+    /// An object becomes another, which is there already and has its light from now on.
+    fn succeed(&mut self, old: usize, new: usize, done: &mut Done) {
+        self.live.remove(old);
+        self.touch(old, done);
+        (self.objects[old].successor, self.objects[new].successor) = (Some(new), None);
+        self.objects[new].light = self.objects[old].light.take();
+        if let Some(light) = self.objects[new].light {
+            self.lights[light].body = Some(new);
+        }
     }
 
     /// Adds a light without area; answers what takes it back.
@@ -571,6 +677,10 @@ fn check_lamp(kind: PointLightKind, intensity: &Bands) -> Result<(), &'static st
         }
         _ => Ok(()),
     }
+}
+
+fn id(index: usize) -> ObjectId {
+    ObjectId(index as u32)
 }
 
 fn affine(matrix: &[f64; 16]) -> DAffine3 {

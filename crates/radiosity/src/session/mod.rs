@@ -157,6 +157,8 @@ struct Placed {
     source: usize,
     /// None of what was handed in.
     form: Option<Form>,
+    /// What it became when it got another form.
+    successor: Option<usize>,
     paint: Arc<Paint>,
     display: Arc<OnceLock<Display>>,
     coat: Option<Bands>,
@@ -174,6 +176,7 @@ impl Placed {
         Placed {
             source,
             form: None,
+            successor: None,
             paint: Arc::new(Paint::new(&world.scene, source, &world.bodies[body].shape)),
             display: Arc::default(),
             coat: None,

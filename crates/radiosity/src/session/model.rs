@@ -69,6 +69,8 @@ pub struct ModelObject {
     pub movable: bool,
     /// What was added has one, in the coordinates that the matrix carries from; what was handed in has none.
     pub form: Option<Form>,
+    /// What it became when it got another form: that has its light and its place from then on.
+    pub successor: Option<ObjectId>,
     /// The light that it is, if it shines.
     pub light: Option<LightId>,
 }

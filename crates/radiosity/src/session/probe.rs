@@ -106,6 +106,7 @@ impl Session {
                     deleted: false,
                     movable: placed.is_movable,
                     form: placed.form,
+                    successor: None,
                     light: None,
                 });
             }
@@ -115,6 +116,7 @@ impl Session {
             known.tint = std::array::from_fn(|band| base[band] * scale[band]);
             known.emission = std::array::from_fn(|band| mean[band] * factor[band]);
             known.deleted = !body.is_present;
+            known.successor = placed.successor.map(|successor| ObjectId(successor as u32));
             known.light = placed.light.map(|light| LightId(light as u32));
         }
         model.lights = self.model_lights();
