@@ -9,6 +9,7 @@ pub mod direct;
 pub mod exposure;
 pub mod form_factors;
 pub mod gather;
+pub(crate) mod lanes;
 pub mod live;
 pub mod luminaires;
 pub mod nodes;

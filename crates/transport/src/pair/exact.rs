@@ -31,7 +31,7 @@ const SMALL: f64 = 6.0;
 
 /// A_i F_ij = A_j F_ji, m², of two facets with nothing between them. The same bits whichever comes first.
 pub fn exact(from: &Facet, to: &Facet) -> f64 {
-    exchange(from, to)[0]
+    exact_within(from, to, 0.0)[0]
 }
 
 /// The closed form as a method. It knows of no occlusion: where something stands between the facets, the value is that
@@ -41,30 +41,30 @@ pub struct Exact;
 
 impl Pair for Exact {
     fn factor(&self, from: &Facet, to: &Facet, occlusion: &dyn Occlusion) -> Factor {
-        let [value, error] = exchange(from, to).map(|x| x / from.area());
+        let [value, error] = exact_within(from, to, 0.0).map(|x| x / from.area());
         Factor { value, error: if occlusion.may_block(from, to) { value + error } else { error } }
     }
 }
 
 /// A_i F_ij and a bound of what rounding does to it: to the sums, and to the coordinates, which are off by as much as
-/// corners may be that count as touching.
-fn exchange(from: &Facet, to: &Facet) -> [f64; 2] {
+/// corners may be that count as touching. What the contour loses is let pass within a tolerance, m².
+pub(crate) fn exact_within(from: &Facet, to: &Facet, tolerance: f64) -> [f64; 2] {
     let (first, second) = if order(from, to) == Ordering::Greater { (to, from) } else { (from, to) };
     let Some([a, b]) = facing(first, second) else { return [0.0; 2] };
     let (a, b) = (Outline::new(a, first.normal()), Outline::new(b, second.normal()));
-    let [value, error] = integral(&a, &b);
+    let [value, error] = integral(&a, &b, tolerance);
     [value.max(0.0), error + touch(first, second) * a.radius.min(b.radius)]
 }
 
-/// The integral by the way that loses fewest digits, and a bound of its rounding.
-fn integral(a: &Outline, b: &Outline) -> [f64; 2] {
+/// The integral by the way that loses fewest digits, or the contour within a tolerance, and a bound of its rounding.
+fn integral(a: &Outline, b: &Outline, tolerance: f64) -> [f64; 2] {
     let distance = a.centre.distance(b.centre);
     if a.radius + b.radius < FAR * distance {
         let value = over_both_areas(a, b);
         return [value, 1e-13 * value.abs()];
     }
     let [value, error] = contour(a, b, distance.max(a.radius + b.radius));
-    if error > ROUNDED * value {
+    if error > tolerance.max(ROUNDED * value) {
         let (small, large) = if a.radius < b.radius { (a, b) } else { (b, a) };
         if small.radius * SMALL < large.distance_of_edges(small.centre) {
             let value = over_smaller_area(small, large);
@@ -288,8 +288,8 @@ mod tests {
             // Every second pair shares a corner.
             let shift = if k % 2 == 0 { first.corners()[1] } else { DVec3::ZERO };
             let second = moved(&floor(UNIT, UNIT), DQuat::IDENTITY, shift);
-            let [whole, error] = exchange(&first, &second);
-            let of_part = |corners: [DVec3; 3]| exchange(&Facet::new(corners.to_vec()).unwrap(), &second);
+            let [whole, error] = exact_within(&first, &second, 0.0);
+            let of_part = |corners: [DVec3; 3]| exact_within(&Facet::new(corners.to_vec()).unwrap(), &second, 0.0);
             let parts: Vec<[f64; 2]> = first.triangles().into_iter().map(of_part).collect();
             let sum = |k: usize| parts.iter().map(|part| part[k]).sum::<f64>();
             let (off, scale) = ((whole - sum(0)).abs(), first.area().min(1.0));
@@ -326,7 +326,7 @@ mod tests {
             };
             let faces: Vec<Facet> = solid.iter().map(face).collect();
             for from in &faces {
-                let row = faces.iter().map(|to| exchange(from, to));
+                let row = faces.iter().map(|to| exact_within(from, to, 0.0));
                 let [sum, error] = row.fold([0.0; 2], |sum, [value, error]| [sum[0] + value, sum[1] + error]);
                 let off = (sum / from.area() - 1.0).abs();
                 // The narrow sides are as wide as the coordinates say, to their rounding.

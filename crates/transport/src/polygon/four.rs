@@ -5,74 +5,8 @@
 //! bit for bit. Triangles that the receiver's horizon cuts are left to it.
 
 use super::{ABOVE, BELOW, point_to_triangle};
+use crate::lanes::{Lanes, Vectors, cross, dot, everywhere, minus};
 use glam::DVec3;
-use std::ops::{Add, Div, Mul, Sub};
-
-/// Four numbers, one for each triangle.
-#[derive(Clone, Copy, Debug)]
-struct Lanes([f64; 4]);
-
-macro_rules! lanewise {
-    ($($operation:ident $name:ident $sign:tt),*) => {$(
-        impl $operation for Lanes {
-            type Output = Lanes;
-            #[inline(always)]
-            fn $name(self, Lanes([e, f, g, h]): Lanes) -> Lanes {
-                let Lanes([a, b, c, d]) = self;
-                Lanes([a $sign e, b $sign f, c $sign g, d $sign h])
-            }
-        }
-    )*};
-}
-lanewise!(Add add +, Sub sub -, Mul mul *, Div div /);
-
-impl Lanes {
-    #[inline(always)]
-    fn of(x: f64) -> Lanes {
-        Lanes([x; 4])
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Lanes {
-        let Lanes([a, b, c, d]) = self;
-        Lanes([a.sqrt(), b.sqrt(), c.sqrt(), d.sqrt()])
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Lanes {
-        let Lanes([a, b, c, d]) = self;
-        Lanes([a.abs(), b.abs(), c.abs(), d.abs()])
-    }
-
-    /// Own lanes where `condition` is above zero, others' elsewhere.
-    #[inline(always)]
-    fn above_zero(Lanes([p, q, r, s]): Lanes, Lanes([a, b, c, d]): Lanes, Lanes([e, f, g, h]): Lanes) -> Lanes {
-        let pick = |condition: f64, own: f64, other: f64| if condition > 0.0 { own } else { other };
-        Lanes([pick(p, a, e), pick(q, b, f), pick(r, c, g), pick(s, d, h)])
-    }
-}
-
-type Vectors = [Lanes; 3];
-
-#[inline(always)]
-fn minus(a: Vectors, b: Vectors) -> Vectors {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot(a: Vectors, b: Vectors) -> Lanes {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross(a: Vectors, b: Vectors) -> Vectors {
-    [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
-}
-
-#[inline(always)]
-fn everywhere(v: DVec3) -> Vectors {
-    [Lanes::of(v.x), Lanes::of(v.y), Lanes::of(v.z)]
-}
 
 /// Corners of up to four triangles, counter-clockwise seen from the side that emits.
 #[derive(Clone, Debug)]

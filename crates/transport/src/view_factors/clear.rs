@@ -1,13 +1,15 @@
-//! Pairs with nothing between them: cubature where they are far apart, the closed form where they are not.
+//! Pairs with nothing between them: by their moments where they are far apart, cubature where they are nearer, the closed
+//! form where they are near.
 //!
 //! A_i F_ij = ∫∫ cos θ_i cos θ_j/(π r²) dA_j dA_i by products of Gauss rules of order n on either part. Their error
 //! falls as (R/r)^2n with the radius R of the larger part and the distance r of the centres; which n, or the closed
 //! form, is decided pair by pair by what this leaves of the accuracy asked.
 
-use super::frame::{Frame, ORDERS, Weighted};
+use super::frame::{Frame, LEAST, ORDERS, Weighted};
+use super::moments::{self, Far, Moments, NEAREST};
 use super::part::{Four, Part};
 use super::visible::Plane;
-use crate::pair::exact::exact;
+use crate::pair::exact::exact_within;
 use glam::DVec3;
 use radiosity_scene::Facet;
 use smallvec::SmallVec;
@@ -30,91 +32,77 @@ impl Exchange {
 
 /// The error of order n is at most this times (R/r)^2n A_i A_j/(π r²): twice the largest that was found among random
 /// pairs (test below).
-const CONSTANT: [f64; ORDERS] = [2.0, 0.6, 0.6, 0.3];
-
-/// Parts with R/r above this are too near for the expansion behind the bound.
-const NEAREST: f64 = 0.45;
+const CONSTANT: [f64; ORDERS] = [0.6, 0.6, 0.3];
 
 /// The closed form's relative rounding error, and its absolute one relative to the smaller area.
 const CLOSED_FORM: [f64; 2] = [1e-11, 1e-13];
 
-/// How the value was found: the order of the rule, or zero for the closed form.
+/// How the value was found: zero by the closed form, one by moments, else the order of the rule.
 pub type Order = usize;
 
-/// A_i F_ij of two parts that see each other whole where they face each other at all; `tolerance` in m². `cut` says
-/// that one reaches behind the other's plane.
-pub fn clear(a: &Part, b: &Part, tolerance: f64, cut: bool) -> (Exchange, Order) {
-    let bounds = Bounds {
-        radius: a.radius.max(b.radius),
-        squared: a.shape.centroid().distance_squared(b.shape.centroid()),
-        areas: [a.shape.area(), b.shape.area()],
-    };
-    match bounds.order(tolerance).filter(|_| !cut) {
+/// A_i F_ij of two parts that see each other whole where they face each other at all; `far` is what their moments tell, and
+/// `tolerance` in m². `cut` says that one reaches behind the other's plane.
+pub fn clear(a: &Part, b: &Part, far: Exchange, tolerance: f64, cut: bool) -> (Exchange, Order) {
+    if far.error <= tolerance && !cut {
+        return (Exchange { value: far.value.max(0.0), ..far }, 1);
+    }
+    match order([&a.moments, &b.moments], tolerance).filter(|_| !cut) {
         Some((order, error)) => {
-            let (from, to) = (plane_of(&a.shape), plane_of(&b.shape));
-            (Exchange { value: cubature((a.rule(order), from), (b.fours(order), to)).max(0.0), error }, order)
+            let from = a.rule(order).iter().flat_map(Four::points);
+            let value = cubature((from, plane_of(&a.moments)), (b.rule(order), plane_of(&b.moments)));
+            (Exchange { value: value.max(0.0), error }, order)
         }
-        None => (closed_form(&a.shape, &b.shape), 0),
+        None => (closed_form(&a.shape, &b.shape, tolerance), 0),
     }
 }
 
 /// The same of a frame with unit `normal` and a part.
 pub fn clear_frame(frame: &Frame, normal: DVec3, b: &Part, tolerance: f64) -> Exchange {
-    let centre = frame.centre();
-    let bounds = Bounds {
-        radius: frame.corners().iter().map(|c| c.distance(centre)).fold(b.radius, f64::max),
-        squared: centre.distance_squared(b.shape.centroid()),
-        areas: [frame.area(), b.shape.area()],
-    };
-    match bounds.order(tolerance) {
+    let of_frame = frame.moments(normal);
+    let far = Far::of(&[moments::Four::new(&[&of_frame])], &b.moments).exchange(0);
+    if far.error <= tolerance {
+        return Exchange { value: far.value.max(0.0), ..far };
+    }
+    match order([&of_frame, &b.moments], tolerance) {
         Some((order, error)) => {
-            let from = (normal, normal.dot(centre));
-            let value = cubature((&frame.rule(order), from), (b.fours(order), plane_of(&b.shape))).max(0.0);
+            let from = frame.rule(order).into_iter();
+            let value = cubature((from, plane_of(&of_frame)), (b.rule(order), plane_of(&b.moments))).max(0.0);
             Exchange { value, error }
         }
-        None => Facet::new(frame.corners().to_vec()).map_or(Exchange::default(), |shape| closed_form(&shape, &b.shape)),
+        None => Facet::new(frame.corners().to_vec())
+            .map_or(Exchange::default(), |shape| closed_form(&shape, &b.shape, tolerance)),
     }
 }
 
-/// The closed form, whatever faces what.
-pub fn closed_form(a: &Facet, b: &Facet) -> Exchange {
-    let value = exact(a, b);
+/// The closed form, whatever faces what; within a tolerance (m²) if its rounding allows.
+pub fn closed_form(a: &Facet, b: &Facet, tolerance: f64) -> Exchange {
+    let [value, rounding] = exact_within(a, b, tolerance);
     let [relative, absolute] = CLOSED_FORM;
-    Exchange { value, error: relative * value + absolute * a.area().min(b.area()) }
+    Exchange { value, error: rounding.max(relative * value + absolute * a.area().min(b.area())) }
 }
 
-/// What the errors of rules go by.
-struct Bounds {
-    /// Radius of the larger.
-    radius: f64,
-    /// Distance of the centres, squared.
-    squared: f64,
-    areas: [f64; 2],
-}
-
-impl Bounds {
-    /// The least order that meets a tolerance (m²), and the bound of its error.
-    fn order(&self, tolerance: f64) -> Option<(Order, f64)> {
-        let ratio = self.radius * self.radius / self.squared;
-        if ratio >= NEAREST * NEAREST {
-            return None;
-        }
-        let mut bound = self.areas[0] * self.areas[1] / (std::f64::consts::PI * self.squared);
-        (1..=ORDERS).find_map(|order| {
-            bound *= ratio;
-            let error = CONSTANT[order - 1] * bound;
-            (error <= tolerance).then_some((order, error))
-        })
+/// The least order of a rule that meets a tolerance (m²), and the bound of its error.
+fn order([a, b]: [&Moments; 2], tolerance: f64) -> Option<(Order, f64)> {
+    let (radius, squared) = (a.radius.max(b.radius), a.centre.distance_squared(b.centre));
+    let ratio = radius * radius / squared;
+    if ratio >= NEAREST * NEAREST {
+        return None;
     }
+    let mut bound = a.area * b.area / (std::f64::consts::PI * squared) * ratio;
+    CONSTANT.iter().zip(LEAST..).find_map(|(constant, order)| {
+        bound *= ratio;
+        let error = constant * bound;
+        (error <= tolerance).then_some((order, error))
+    })
 }
 
-fn plane_of(shape: &Facet) -> Plane {
-    (shape.normal(), shape.normal().dot(shape.centroid()))
+fn plane_of(of: &Moments) -> Plane {
+    (of.normal, of.normal.dot(of.centre))
 }
 
 /// The product of two rules. The height of a point above the other's plane is the distance times the cosine there, and the
 /// same for all pairs that the point is in.
-fn cubature((from, (n_a, of_a)): (&[Weighted], Plane), (to, (n_b, of_b)): (&[Four], Plane)) -> f64 {
+fn cubature((from, (n_a, of_a)): (impl Iterator<Item = Weighted>, Plane), (to, (n_b, of_b)): (&[Four], Plane)) -> f64 {
     let heights: SmallVec<[[f64; 4]; 4]> = to
         .iter()
         .map(|Four { at: [x, y, z], weights }| {
@@ -122,7 +110,7 @@ fn cubature((from, (n_a, of_a)): (&[Weighted], Plane), (to, (n_b, of_b)): (&[Fou
         })
         .collect();
     let mut sum = 0.0;
-    for &[px, py, pz, w] in from {
+    for [px, py, pz, w] in from {
         let mut inner = [0.0; 4];
         for (Four { at: [x, y, z], .. }, heights) in to.iter().zip(&heights) {
             for k in 0..4 {
@@ -140,6 +128,7 @@ fn cubature((from, (n_a, of_a)): (&[Weighted], Plane), (to, (n_b, of_b)): (&[Fou
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pair::exact::exact;
     use radiosity_trace::sampling::Random;
 
     /// Random parallelograms and triangles, about a tenth of them as flat as slats.
@@ -153,11 +142,11 @@ mod tests {
         Part::of(0, &facet).remove(0)
     }
 
-    /// The bound holds for random pairs, at distances from the nearest allowed to ten times that.
+    /// The bounds of rules and moments hold for random pairs, at distances from the nearest allowed to ten times that.
     #[test]
-    fn cubature_is_as_good_as_stated() {
+    fn cubature_and_moments_are_as_good_as_stated() {
         let mut random = Random::new(1);
-        let mut worst = [0f64; ORDERS];
+        let (mut worst, mut far_worst) = ([0f64; ORDERS], [0f64; 2]);
         let mut pairs = 0;
         while pairs < 20_000 {
             let distance = (1.0 + 9.0 * random.next_unit().powi(2)) / NEAREST;
@@ -168,18 +157,27 @@ mod tests {
                 continue;
             }
             pairs += 1;
-            let radius = a.radius.max(b.radius);
-            let squared = a.shape.centroid().distance_squared(b.shape.centroid());
-            let mut bound = a.shape.area() * b.shape.area() / (std::f64::consts::PI * squared);
+            let bound = |power: f64| {
+                let (radius, squared) =
+                    (a.moments.radius.max(b.moments.radius), a.shape.centroid().distance_squared(b.shape.centroid()));
+                a.shape.area() * b.shape.area() / (std::f64::consts::PI * squared)
+                    * (radius * radius / squared).powf(power)
+            };
             let value = exact(&a.shape, &b.shape);
-            for order in 1..=ORDERS {
-                bound *= radius * radius / squared;
-                let found = cubature((a.rule(order), plane_of(&a.shape)), (b.fours(order), plane_of(&b.shape)));
-                let off = (found - value).abs() - CLOSED_FORM[0] * value;
-                worst[order - 1] = worst[order - 1].max(off / bound);
+            let off = |found: f64| (found - value).abs() - CLOSED_FORM[0] * value;
+            for (order, worst) in (LEAST..).zip(&mut worst) {
+                let from = (a.rule(order).iter().flat_map(Four::points), plane_of(&a.moments));
+                let found = cubature(from, (b.rule(order), plane_of(&b.moments)));
+                *worst = worst.max(off(found) / bound(order as f64));
             }
+            let far = Far::of(&[moments::Four::new(&[&a.moments])], &b.moments).exchange(0);
+            let are_symmetric = a.moments.is_symmetric && b.moments.is_symmetric;
+            let (far_of, power) = if are_symmetric { (&mut far_worst[0], 2.0) } else { (&mut far_worst[1], 1.5) };
+            *far_of = far_of.max(off(far.value) / bound(power));
+            assert!(off(far.value) <= far.error);
         }
-        for (worst, constant) in worst.into_iter().zip(CONSTANT) {
+        let constants = CONSTANT.into_iter().chain([moments::CONSTANT, moments::CONSTANT_SKEW]);
+        for (worst, constant) in worst.into_iter().chain(far_worst).zip(constants) {
             assert!(2.0 * worst >= 0.5 * constant && 1.5 * worst <= constant, "{worst} of {constant}");
         }
     }

@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// Parts of a leaf: those that share what they see of a target. With 4 a room of 800 patches takes 15 % more, with 8 or 32 some
 /// 4 %: fewer neighbours to share with, or less that is proven for all of them.
-const LEAF: usize = 16;
+pub const LEAF: usize = 16;
 
 /// A node of the tree.
 #[derive(Clone, Debug)]

@@ -96,14 +96,14 @@ impl<'a> Stage<'a> {
         }
         let of_whole = OF_WHOLE * tolerance / area;
         // Most facets see smoothly enough as they are: places at corners, which neighbours share, and one in the middle tell.
-        if let Some(piece) = self.sides.uncut((&from, outer.radius), &self.bodies, self.setting) {
+        if let Some(piece) = self.sides.uncut((&from, outer.moments.radius), &self.bodies, self.setting) {
             let mut view = View { shadows, stage: self, from: &from, of_whole };
             let goal = Goal { whole: whole.value, tolerance: UNCUT * tolerance, may_divide: false };
             if let Some(found) = integrate(&[piece], goal, (&mut view, sights), list) {
                 return Some(found.within(whole));
             }
         }
-        let pieces = self.sides.cut((&from, outer.radius), &self.bodies, self.setting);
+        let pieces = self.sides.cut((&from, outer.moments.radius), &self.bodies, self.setting);
         let mut view = View { shadows, stage: self, from: &from, of_whole };
         let goal = Goal { whole: whole.value, tolerance, may_divide: true };
         integrate(&pieces, goal, (&mut view, sights), list).map(|found| found.within(whole))
@@ -191,10 +191,11 @@ impl Shaded for View<'_, '_> {
     }
 
     fn whole(&mut self, cell: &Frame) -> Exchange {
+        let tolerance = self.of_whole * cell.area();
         match self.stage.inner {
-            Some(inner) => clear_frame(cell, self.stage.normal, inner, self.of_whole * cell.area()),
+            Some(inner) => clear_frame(cell, self.stage.normal, inner, tolerance),
             None => Facet::new(cell.corners().to_vec())
-                .map_or(Exchange::default(), |cell| closed_form(&cell, &self.stage.to)),
+                .map_or(Exchange::default(), |cell| closed_form(&cell, &self.stage.to, tolerance)),
         }
     }
 

@@ -14,6 +14,7 @@ mod closure;
 mod cluster;
 mod frame;
 mod mixed;
+mod moments;
 mod panel;
 mod part;
 mod shaft;
@@ -97,7 +98,7 @@ pub struct Choices {
     pub facing_away: usize,
     /// Proven blocked.
     pub blocked: usize,
-    /// Proven clear, cubature of one to four points along an edge.
+    /// Proven clear, by moments, and by cubature of two to four points along an edge.
     pub clear_cubature: [usize; 4],
     /// Proven clear, closed form.
     pub clear_closed_form: usize,

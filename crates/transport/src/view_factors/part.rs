@@ -1,7 +1,7 @@
 //! Parts: the facets of an enclosure as convex polygons, with the points that cubature over them needs.
 
-use super::frame::{Frame, ORDERS, Weighted};
-use glam::DVec3;
+use super::frame::{Frame, LEAST, ORDERS, Weighted};
+use super::moments::Moments;
 use radiosity_scene::Facet;
 
 /// Corners of a part at most, so that shafts need no memory of their own; what has more is taken as triangles.
@@ -14,12 +14,10 @@ pub struct Part {
     pub facet: u32,
     /// The polygon.
     pub shape: Facet,
-    /// Radius about the centroid.
-    pub radius: f64,
+    /// Centre, area, radius and second moments.
+    pub moments: Moments,
     /// Points of each order.
-    rules: [Vec<Weighted>; ORDERS],
-    /// The same in fours.
-    fours: [Vec<Four>; ORDERS],
+    rules: [Vec<Four>; ORDERS],
 }
 
 /// Four points of a rule: their coordinates, and their shares of the area, m². What is missing weighs nothing.
@@ -37,36 +35,44 @@ impl Four {
             weights: std::array::from_fn(|k| if k < points.len() { points[k][3] } else { 0.0 }),
         }
     }
+
+    /// The points, without what is missing.
+    #[inline]
+    pub fn points(&self) -> impl Iterator<Item = Weighted> + '_ {
+        let Four { at: [x, y, z], weights } = self;
+        (0..4).map(|k| [x[k], y[k], z[k], weights[k]]).filter(|point| point[3] > 0.0)
+    }
 }
 
 impl Part {
     /// The convex parts of facet `index`.
     pub fn of(index: u32, facet: &Facet) -> Vec<Part> {
-        let part = |shape: Facet| {
-            let rules = rules(shape.corners());
-            let fours = std::array::from_fn(|k| rules[k].chunks(4).map(Four::of).collect());
-            Part { facet: index, radius: shape.radius(), rules, fours, shape }
-        };
         if facet.is_convex() && facet.corners().len() <= CORNERS {
-            return vec![part(facet.clone())];
+            return vec![Part::new(index, facet.clone())];
         }
-        facet.triangles().into_iter().filter_map(|t| Facet::new(t.to_vec()).ok()).map(part).collect()
+        let triangles = facet.triangles().into_iter().filter_map(|t| Facet::new(t.to_vec()).ok());
+        triangles.map(|triangle| Part::new(index, triangle)).collect()
     }
 
-    /// Points of the rule of an order (1 to [`ORDERS`]).
+    fn new(facet: u32, shape: Facet) -> Part {
+        let frames = Frame::of(shape.corners());
+        let points = |order: usize| frames.iter().flat_map(|frame| frame.rule(order)).collect::<Vec<_>>();
+        let (centre, normal) = (shape.centroid(), shape.normal());
+        let moments = Moments {
+            axes: Moments::axes(&points(LEAST), centre, normal),
+            is_symmetric: matches!(frames[..], [Frame { is_square: true, .. }]),
+            area: shape.area(),
+            radius: shape.radius(),
+            centre,
+            normal,
+        };
+        let rules = std::array::from_fn(|k| points(LEAST + k).chunks(4).map(Four::of).collect());
+        Part { facet, shape, moments, rules }
+    }
+
+    /// The points of the rule of an order, in fours.
     #[inline]
-    pub fn rule(&self, order: usize) -> &[Weighted] {
-        &self.rules[order - 1]
+    pub fn rule(&self, order: usize) -> &[Four] {
+        &self.rules[order - LEAST]
     }
-
-    /// The same points in fours.
-    #[inline]
-    pub fn fours(&self, order: usize) -> &[Four] {
-        &self.fours[order - 1]
-    }
-}
-
-fn rules(polygon: &[DVec3]) -> [Vec<Weighted>; ORDERS] {
-    let frames = Frame::of(polygon);
-    std::array::from_fn(|k| frames.iter().flat_map(|frame| frame.rule(k + 1)).collect())
 }

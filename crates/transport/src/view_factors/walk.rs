@@ -4,8 +4,9 @@
 use super::body::Setting;
 use super::cell::{List as Chosen, Sights};
 use super::clear::{Exchange, clear};
-use super::cluster::{Cluster, Clusters};
+use super::cluster::{Cluster, Clusters, LEAF};
 use super::mixed::{Stage, above, distance};
+use super::moments::{Far, Four, Moments};
 use super::panel::Panel;
 use super::part::Part;
 use super::shaft::{Look, Shaft, Stands};
@@ -101,6 +102,9 @@ struct Target<'a> {
     panels: &'a [&'a Panel],
     /// None if nothing does, or too little of it is seen to tell how much.
     stage: Option<Stage<'a>>,
+    /// What the parts of the leaf, from this one on, exchange with it as far as their moments tell.
+    far: Far,
+    first: usize,
 }
 
 impl<'a> Walk<'a> {
@@ -157,17 +161,20 @@ impl<'a> Walk<'a> {
         let distance = |leaf: &Cluster| {
             let middle = leaf.hull.iter().sum::<DVec3>() / leaf.hull.len() as f64;
             let panels = between.iter().map(|panel| &self.panels[*panel as usize]);
-            distance(middle, panels) / self.clusters.parts[leaf.parts.start].radius
+            distance(middle, panels) / self.clusters.parts[leaf.parts.start].moments.radius
         };
         let is_turned = !between.is_empty() && distance(leaves[0]) < distance(leaves[1]);
         let [outer, inner] = if is_turned { [leaves[1], leaves[0]] } else { leaves };
+        let moments: SmallVec<[&Moments; LEAF]> =
+            self.clusters.parts[outer.parts.clone()].iter().map(|part| &part.moments).collect();
+        let fours: SmallVec<[Four; LEAF / 4]> = moments.chunks(4).map(Four::new).collect();
         for target in inner.parts.clone() {
-            self.target(outer, target, between);
+            self.target((outer, &fours), target, between);
         }
     }
 
-    /// All pairs of a leaf with one part.
-    fn target(&mut self, outer: &'a Cluster, target: usize, between: &[u32]) {
+    /// All pairs of a leaf, of whose parts the moments are given, with one part.
+    fn target(&mut self, (outer, fours): (&'a Cluster, &[Four]), target: usize, between: &[u32]) {
         let clusters = self.clusters;
         let inner = &clusters.parts[target];
         let ends = [End::of_cluster(outer), End::of_part(inner)];
@@ -181,7 +188,8 @@ impl<'a> Walk<'a> {
             self.choices.blocked += outer.parts.len();
             return;
         };
-        let mut target = Target { inner, facing, panels: &[], stage: None };
+        let far = Far::of(fours, &inner.moments);
+        let mut target = Target { inner, facing, panels: &[], stage: None, far, first: outer.parts.start };
         if between.is_empty() {
             outer.parts.clone().for_each(|part| self.pair(part, &mut target));
             return;
@@ -240,7 +248,7 @@ impl<'a> Walk<'a> {
         let tolerance = self.tolerance(a, b);
         // Past panels the whole is asked for little more exactly than what is left of it.
         let of_whole = if list.is_empty() { self.options.clear_accuracy * least } else { WHOLE * tolerance };
-        let (whole, order) = clear(a, b, of_whole, facing == Facing::Partly);
+        let (whole, order) = clear(a, b, target.far.exchange(part - target.first), of_whole, facing == Facing::Partly);
         let exchange = if list.is_empty() {
             match order {
                 0 => self.choices.clear_closed_form += 1,
