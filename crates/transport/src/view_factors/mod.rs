@@ -129,7 +129,7 @@ impl Choices {
 pub(crate) const TOUCH: f64 = 5e-7;
 
 /// Bytes that a pair takes at most, while it is found and put in order.
-const BYTES: usize = 2 * size_of::<Entry>();
+const BYTES: usize = size_of::<Entry>() + size_of::<(u32, f32, f64)>();
 
 /// Parts of a block: one task, and the pairs that share the first look at the panels.
 const BLOCK: usize = 32;

@@ -21,24 +21,16 @@ impl Entry {
     }
 }
 
-/// Entries by a key below n, and where those of each key end. By counting: entries of one key keep their order, so that
-/// sums of several parts are always the same.
-fn sorted(chunks: &[Vec<Entry>], n: usize, key: impl Fn(&Entry) -> u32) -> (Vec<Entry>, Vec<usize>) {
-    let mut next = vec![0usize; n + 1];
+/// Where the entries of each key below n begin, of all in the order of the key.
+fn starts(chunks: &[Vec<Entry>], n: usize, key: usize) -> Vec<usize> {
+    let mut starts = vec![0usize; n + 1];
     for entry in chunks.iter().flatten() {
-        next[key(entry) as usize + 1] += 1;
+        starts[entry.pair[key] as usize + 1] += 1;
     }
     for i in 0..n {
-        next[i + 1] += next[i];
+        starts[i + 1] += starts[i];
     }
-    let mut sorted = vec![Entry { pair: [0; 2], value: 0.0, error: 0.0 }; next[n]];
-    for entry in chunks.iter().flatten() {
-        let slot = &mut next[key(entry) as usize];
-        sorted[*slot] = *entry;
-        *slot += 1;
-    }
-    next.truncate(n);
-    (sorted, next)
+    starts
 }
 
 /// View factors between N facets (or surfaces), symmetric by storage: of A_i F_ij = A_j F_ji only i ≤ j is kept, by
@@ -59,28 +51,52 @@ impl ViewFactors {
     pub(crate) fn new(areas: Vec<f64>, entries: impl Iterator<Item = Vec<Entry>>, choices: Choices) -> ViewFactors {
         let n = areas.len();
         let chunks: Vec<Vec<Entry>> = entries.collect();
-        let (by_column, _) = sorted(&chunks, n, |entry| entry.pair[1]);
-        drop(chunks);
-        let (entries, ends) = sorted(&[by_column], n, |entry| entry.pair[0]);
-        let mut of = ViewFactors { areas, starts: vec![0], choices, ..ViewFactors::default() };
-        let mut start = 0;
-        for end in ends {
-            let first = of.columns.len();
-            for &Entry { pair: [_, column], value, error } in &entries[start..end] {
-                if of.columns.len() > first && of.columns.last() == Some(&column) {
-                    let last = of.values.len() - 1;
-                    of.values[last] += value;
-                    of.errors[last] = round_up(f64::from(of.errors[last]) + f64::from(error));
+        let (starts, of_columns) = (starts(&chunks, n, 0), starts(&chunks, n, 1));
+        // By counting, first by columns and then by rows: entries of one pair keep their order, so that their sums are always
+        // the same.
+        let (mut next, mut by_column) = (of_columns.clone(), vec![(0u32, 0f32, 0f64); starts[n]]);
+        for chunk in chunks {
+            for Entry { pair: [row, column], value, error } in chunk {
+                let slot = &mut next[column as usize];
+                by_column[*slot] = (row, error, value);
+                *slot += 1;
+            }
+        }
+        next.copy_from_slice(&starts);
+        let (mut columns, mut values, mut errors) =
+            (vec![0u32; starts[n]], vec![0f64; starts[n]], vec![0f32; starts[n]]);
+        for (column, range) in of_columns.windows(2).enumerate() {
+            for &(row, error, value) in &by_column[range[0]..range[1]] {
+                let slot = &mut next[row as usize];
+                (columns[*slot], values[*slot], errors[*slot]) = (column as u32, value, error);
+                *slot += 1;
+            }
+        }
+        let mut of = ViewFactors { areas, starts, columns, values, errors, choices };
+        of.sum_equal();
+        of
+    }
+
+    /// Sums entries of one pair, which come one after another: those of parts of concave facets.
+    fn sum_equal(&mut self) {
+        let (mut read, mut write) = (0, 0);
+        for row in 0..self.len() {
+            let first = write;
+            for k in read..self.starts[row + 1] {
+                if write > first && self.columns[write - 1] == self.columns[k] {
+                    self.values[write - 1] += self.values[k];
+                    self.errors[write - 1] = round_up(f64::from(self.errors[write - 1]) + f64::from(self.errors[k]));
                 } else {
-                    of.columns.push(column);
-                    of.values.push(value);
-                    of.errors.push(error);
+                    self.columns[write] = self.columns[k];
+                    (self.values[write], self.errors[write]) = (self.values[k], self.errors[k]);
+                    write += 1;
                 }
             }
-            start = end;
-            of.starts.push(of.columns.len());
+            (read, self.starts[row + 1]) = (self.starts[row + 1], write);
         }
-        of
+        self.columns.truncate(write);
+        self.values.truncate(write);
+        self.errors.truncate(write);
     }
 
     /// Number of facets (or surfaces).
