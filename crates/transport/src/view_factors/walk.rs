@@ -244,12 +244,10 @@ impl<'a> Walk<'a> {
                 }
             }
         }
-        let least = a.shape.area().min(b.shape.area());
-        let tolerance = self.tolerance(a, b);
-        // Past panels the whole is asked for little more exactly than what is left of it.
-        let of_whole = if list.is_empty() { self.options.clear_accuracy * least } else { WHOLE * tolerance };
-        let (whole, order) = clear(a, b, target.far.exchange(part - target.first), of_whole, facing == Facing::Partly);
+        let (far, is_cut) = (target.far.exchange(part - target.first), facing == Facing::Partly);
         let exchange = if list.is_empty() {
+            let least = a.moments.area.min(b.moments.area);
+            let (whole, order) = clear(a, b, far, self.options.clear_accuracy * least, is_cut);
             match order {
                 0 => self.choices.clear_closed_form += 1,
                 order => self.choices.clear_cubature[order - 1] += 1,
@@ -257,6 +255,9 @@ impl<'a> Walk<'a> {
             whole
         } else {
             self.choices.clipped += 1;
+            let tolerance = self.tolerance(a, b);
+            // Past panels the whole is asked for little more exactly than what is left of it.
+            let (whole, _) = clear(a, b, far, WHOLE * tolerance, is_cut);
             let tolerance = (tolerance - whole.error).max(0.5 * tolerance);
             let scratch = (&mut self.shadows, &mut self.sights);
             let found = target.stage.as_mut().and_then(|stage| stage.mixed(scratch, a, &list, whole, tolerance));
