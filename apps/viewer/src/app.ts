@@ -171,6 +171,7 @@ export class App {
         break;
       }
       case 'object':
+        this.wished.delete(notice.id);
         this.welcome(notice);
         this.objectsAhead.hear(notice);
         break;
@@ -252,7 +253,6 @@ export class App {
     surface.matrix.fromArray(object.matrix);
     this.stage.moved(surface);
     this.followed(surface);
-    this.wished.delete(id);
     if (object.deleted && this.selected === id) this.mark(this.heir(object));
     else if (this.group().includes(surface)) {
       this.marks.outline(this.group());
@@ -277,11 +277,15 @@ export class App {
     this.tellSoon('lights');
   }
 
-  /** What something that is gone has become. */
+  /** What something that is gone has become, as far as that is known: what became of that may not have been heard yet. */
   private heir({ successor }: ObjectNotice): number | null {
-    if (successor === null) return null;
-    const next = this.objects.get(successor);
-    return next?.deleted ? this.heir(next) : successor;
+    let heir = successor;
+    const seen = new Set<number>();
+    while (heir !== null && this.objects.get(heir)?.deleted && !seen.has(heir)) {
+      seen.add(heir);
+      heir = this.objects.get(heir)!.successor;
+    }
+    return heir !== null && seen.has(heir) ? successor : heir;
   }
 
   /** Whether an object is one of the copies that were asked for. */
@@ -431,7 +435,8 @@ export class App {
   }
 
   /** Lets parallel light come from a height and a direction about the zenith, radians. */
-  shineFrom({ id, direction }: LightNotice, sun: Sun): void {
+  shineFrom({ id, direction }: LightNotice, { altitude, azimuth }: Sun): void {
+    const sun = { altitude: Math.min(Math.PI / 2, Math.max(-Math.PI / 2, altitude)), azimuth };
     const now = new Vector3().fromArray(direction!).applyQuaternion(this.stage.root.quaternion).normalize();
     this.moveLight(id, new Matrix4().makeRotationFromQuaternion(new Quaternion().setFromUnitVectors(now, raysOf(sun))));
   }
@@ -490,9 +495,15 @@ export class App {
   }
 
   /** Places of what is selected after a motion of the world. */
-  private placed(motion: Matrix4, from = (surface: Surface) => surface.matrix): [Surface, Matrix4][] {
+  private placed(motion: Matrix4, from = (surface: Surface) => this.matrixOf(surface)): [Surface, Matrix4][] {
     const inScene = this.inScene(motion);
     return this.group().map((surface) => [surface, inScene.clone().multiply(from(surface))]);
+  }
+
+  /** Where a thing is, or will be in the form that was asked for. */
+  private matrixOf({ object, matrix }: Surface): Matrix4 {
+    const wished = this.wished.get(object);
+    return wished ? new Matrix4().fromArray(wished.matrix) : matrix;
   }
 
   /** Moves what is selected by a motion of the world, from where it is or from given places. */

@@ -7,7 +7,7 @@ import type { Edit, Form, NewObject, ObjectNotice } from './wire';
 /** Sides of a box, metres: a stool. */
 const BOX = 0.5;
 
-/** Least side of a box, over the extent of the scene: smaller ones could not be seen in it, and far smaller ones are refused. */
+/** Least side of what is added, over the extent of the scene: smaller ones could not be seen in it, and far smaller ones are refused. */
 const LEAST = 1e-3;
 
 /** A panel, metres: its sides, its thickness, how far its rim goes around what shines, how far it hangs below the ceiling. As those
@@ -90,7 +90,7 @@ function onCeiling(stage: Stage, side: number, scale: number, isAdded: (object: 
   return null;
 }
 
-/** What gives what belongs together another size: a box stands where it stood, and a panel keeps its rim. */
+/** What gives what belongs together another size: a box stands where it stood, and a panel keeps its rim, which is at most half of it. */
 export function reshaped(parts: (Shaped & { id: number })[], size: number[]): Edit[] {
   const lamp = parts.find(({ form }) => 'rectangle' in form!);
   const old = sizeOf(parts);

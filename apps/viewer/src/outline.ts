@@ -1,7 +1,7 @@
 // A line around what is selected: its mask is drawn first, and the line is where the mask ends.
 import {
-  BufferAttribute, BufferGeometry, Color, GLSL3, type Camera, Mesh, type Scene, ShaderMaterial, Vector2,
-  type WebGLRenderer, WebGLRenderTarget,
+  BufferAttribute, BufferGeometry, Color, GLSL3, type Camera, Mesh, type Scene, ShaderMaterial, Vector2, type WebGLRenderer,
+  WebGLRenderTarget,
 } from 'three';
 import { WIDEN } from './border';
 import { shared, type Surface } from './surface';

@@ -362,12 +362,16 @@ export class Stage {
     await this.renderer.readRenderTargetPixelsAsync(this.meter, 0, 0, METER[0], METER[1], pixels);
     this.isMetering = false;
     const seen: Metered = { luminance: [], illuminance: [], picture: new Float32Array(METER[0] * METER[1]) };
+    const shining: number[] = [];
     for (let i = 0; i < pixels.length; i += 4) {
       if (pixels[i + 3] < 0.5) continue;
       if (pixels[i] > 0) seen.luminance.push(pixels[i]);
+      if (pixels[i + 2] > 0) shining.push(pixels[i + 2]);
       if (pixels[i + 1] > 0) seen.illuminance.push(pixels[i + 1]);
       seen.picture[i / 4] = pixels[i + 1];
     }
+    // Lamps that fill the picture would leave their room black; where there is nothing else, they count.
+    if (seen.luminance.length === 0) seen.luminance = shining;
     return seen;
   }
 

@@ -114,14 +114,14 @@ export const FRAGMENT = /* glsl */ `
       reflectance *= texture(map, vUv).rgb;
     #endif
     float lux = dot(vLight, LUMINANCE);
-    vec3 luminance = min(reflectance, 0.99) * vLight * 0.31830988618 + emission * emissionShown;
+    vec3 lit = min(reflectance, 0.99) * vLight * 0.31830988618;
     #ifdef SHEET
       // What shines on the other side comes through.
-      luminance += vThrough * 0.31830988618;
+      lit += vThrough * 0.31830988618;
     #endif
+    vec3 luminance = lit + emission * emissionShown;
     if (mode == ${Mode.Meter}) {
-      // Lamps that fill the picture would leave their room black.
-      outColour = vec4(dot(luminance - emission * emissionShown, LUMINANCE), lux, 0.0, 1.0);
+      outColour = vec4(dot(lit, LUMINANCE), lux, dot(luminance, LUMINANCE), 1.0);
       return;
     }
     vec3 colour = mode == ${Mode.Lux} ? falseColour(lux) : display(luminance, exposure);

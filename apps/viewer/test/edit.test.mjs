@@ -535,6 +535,12 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   (await foot()).forEach((x, k) => assert.ok(Math.abs(x - stood[k]) < 1e-5, `${x} instead of ${stood[k]}: it stands where it stood`));
   assert.equal((await state(page)).objects.find(({ id }) => id === box.id).successor, tall.id);
   assert.equal((await state(page)).undo, 'resize Box 1');
+  // Taken back and made again, it stays selected.
+  for (const [key, id] of [['z', box.id], ['y', tall.id]]) {
+    await page.keyboard.press('Escape');
+    await page.keyboard.press(`Control+${key}`);
+    await selected(id - first);
+  }
   await field('Height, metres', 0);
   assert.match((await state(page)).message, /more than nothing/);
   await page.waitForFunction((height) => document.querySelector('[aria-label="Height, metres"]').value === String(height), Number((2 * height).toPrecision(4)));

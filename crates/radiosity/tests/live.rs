@@ -393,8 +393,8 @@ fn catalogue_77_what_is_added_is_as_if_it_had_always_been_there() {
     assert_ne!(now[..before.len()], before[..]);
 }
 
-/// A lamp gets another form twice, each time by the id that it had at first: it is the same lamp with as many lumens, at once the
-/// light of a lamp that was added so, and taken back to the last bit.
+/// A lamp gets another form twice, each time by the id that it had at first: it is the same lamp with as many lumens, and that is taken
+/// back to the last bit. Within a series its copies are counted with their lights.
 #[test]
 fn catalogue_77_what_gets_another_form_stays_what_it_is() {
     let down = glam::DMat4::from_translation(glam::DVec3::new(0.3, 0.45, 0.25))
@@ -445,6 +445,23 @@ fn catalogue_77_what_gets_another_form_stays_what_it_is() {
     let [second, first] = &again;
     [first, second].into_iter().for_each(|edit| drop(session.apply(edit).unwrap()));
     assert_eq!(session.model().lights[lamp.0 as usize].object, Some(now));
+    let lights = session.model().lights.len() as u32;
+    let dot = NewLight {
+        name: String::new(),
+        kind: PointLightKind::Point,
+        position: [0.3, 0.3, 0.3],
+        direction: [0.0; 3],
+        intensity: [1.0; 3],
+    };
+    let change = |light| Edit::ChangeLight { light, kind: PointLightKind::Point, intensity: [1.0; 3] };
+    let series = |last| {
+        let copy = Edit::Copy { object: id, matrix: panel.matrix };
+        Edit::Several(vec![reshape([0.1; 2]), copy, Edit::AddLight { light: dot.clone() }, change(LightId(last))])
+    };
+    assert_eq!(session.apply(&series(lights)), Err(EditError::NotPlaceable(LightId(lights))), "that is the copy");
+    let done = session.apply(&series(lights + 1)).unwrap();
+    assert_eq!(done.added_lights, [LightId(lights), LightId(lights + 1)]);
+    session.apply(&done.inverse).unwrap();
     let of_file = Edit::Reshape { object: ObjectId(0), form: panel.form, matrix: panel.matrix };
     assert!(matches!(session.apply(&of_file), Err(EditError::Form { .. })));
     assert!(matches!(session.apply(&reshape([0.0, 1.0])), Err(EditError::Form { .. })));
@@ -463,15 +480,21 @@ fn what_cannot_be_added_is_refused() {
     };
     let far = glam::DMat4::from_translation(glam::DVec3::X * 1e3).to_cols_array();
     for (wrong, why) in [
-        (NewObject { form: Form::Box { size: [0.1, 0.0, 0.1] }, ..sound.clone() }, "lengths"),
-        (NewObject { form: Form::Rectangle { size: [0.1, f64::NAN] }, ..sound.clone() }, "lengths"),
-        (NewObject { form: Form::Rectangle { size: [0.1, f64::INFINITY] }, ..sound.clone() }, "lengths"),
-        (NewObject { form: Form::Rectangle { size: [0.1, 1e3] }, ..sound.clone() }, "from the middle"),
+        (NewObject { form: Form::Box { size: [0.1, 0.0, 0.1] }, ..sound.clone() }, "a length"),
+        (NewObject { form: Form::Rectangle { size: [0.1, f64::NAN] }, ..sound.clone() }, "a length"),
+        (NewObject { form: Form::Rectangle { size: [0.1, f64::INFINITY] }, ..sound.clone() }, "a length"),
+        (NewObject { form: Form::Rectangle { size: [0.1, 1e3] }, ..sound.clone() }, "a length"),
+        (NewObject { form: Form::Rectangle { size: [0.1, 2.2] }, ..sound.clone() }, "from the middle"),
         (NewObject { matrix: far, ..sound.clone() }, "from the middle"),
         (NewObject { matrix: [0.0; 16], ..sound.clone() }, "no placement"),
         (NewObject { reflectance: [0.5, 1.0, 0.5], ..sound.clone() }, "reflectance"),
         (NewObject { emission: [0.5, -1.0, 0.5], ..sound.clone() }, "emission"),
         (NewObject { emission: [f32::NAN; 3], ..sound.clone() }, "emission"),
+        (NewObject { emission: [1e-45, 0.0, 0.0], ..sound.clone() }, "emission"),
+        (
+            NewObject { matrix: glam::DMat4::from_scale(glam::DVec3::splat(1.01)).to_cols_array(), ..sound.clone() },
+            "lengths",
+        ),
         (NewObject { name: "x".repeat(201), ..sound.clone() }, "name"),
     ] {
         let error = session.apply(&Edit::Add { object: Box::new(wrong.clone()) }).unwrap_err().to_string();

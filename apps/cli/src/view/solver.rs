@@ -115,7 +115,10 @@ struct Shown {
 fn gesture(command: &Command) -> Option<(u64, u64, Vec<history::Target>)> {
     match command {
         Command::Ask { page, request: Request::Edit { edit, gesture: Some(gesture) }, .. } => {
-            Some((*page, *gesture, targets(edit)))
+            let of = targets(edit);
+            // What adds something is never outdated.
+            let adds = of.iter().any(|target| matches!(target, history::Target::NewObject | history::Target::NewLight));
+            (!adds).then_some((*page, *gesture, of))
         }
         _ => None,
     }

@@ -17,7 +17,7 @@ export function lightsPanel(app: App): HTMLElement {
   const kind = el('select', {
     id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind | 'panel'; },
   }, ...[...LAMPS, ['panel', 'Panel']].map(([value, text]) => el('option', { value }, text)));
-  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp where you look: 1000 lm, a panel of 4000 lm on the ceiling above, parallel light of 10 000 lx' }));
+  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp where you look: 1000 lm, in rooms for people a panel of 4000 lm on the ceiling above, parallel light of 10 000 lx' }));
   app.on('lights', () => {
     for (const light of app.lights.values()) {
       const old = rows.get(light.id);

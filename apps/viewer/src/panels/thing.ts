@@ -95,12 +95,13 @@ export function thingPanel(app: App): HTMLElement {
   ] as const).map(([angle, name, title]) => [angle, name, number(`${name}, degrees`, title, (value) => {
     app.shineFrom(lamp()!, { ...sun(), [angle]: (value * Math.PI) / 180 });
   })] as const);
-  angles[0][2].min = '-90';
-  angles[0][2].max = '90';
+  [angles[0][2].min, angles[0][2].max] = ['-90', '90'];
+  angles[1][2].removeAttribute('min');
   const standing = el('div', { class: 'numbers' }, ...angles.map(([, name, input]) => el('label', {}, el('span', { class: 'quiet' }, `${name} °`), input)));
   // Lengths of what was added.
   const lengths = ['Width', 'Depth', 'Height'].map((label, k) => el('input', {
     type: 'number', min: 0, step: 0.05, 'aria-label': `${label}, metres`, title: `${label}, metres`, change: () => {
+      if (app.parts().length === 0) return;
       const size = sizeOf(app.parts());
       size[k] = lengths[k].valueAsNumber;
       if (size[k] > 0) return app.resize(size);
@@ -110,7 +111,7 @@ export function thingPanel(app: App): HTMLElement {
   }));
   const tilt = el('input', {
     type: 'number', step: 5, 'aria-label': 'Tilt about its own width, degrees', title: 'Tilt about its own width, degrees',
-    change: () => (Number.isFinite(tilt.valueAsNumber) ? app.nudge(new Vector3(), 0, (tilt.valueAsNumber * Math.PI) / 180 - app.tilt()) : show()),
+    change: () => (Number.isFinite(tilt.valueAsNumber) && app.parts().length > 0 ? app.nudge(new Vector3(), 0, (tilt.valueAsNumber * Math.PI) / 180 - app.tilt()) : show()),
   });
   const sizing = el('div', { class: 'numbers' }, ...lengths.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'WDH'[k]), input)),
     el('label', {}, el('span', { class: 'quiet' }, 'Tilt °'), tilt));
@@ -212,6 +213,6 @@ export function thingPanel(app: App): HTMLElement {
   app.on('selection', show);
   app.on('objects', show);
   app.on('lights', offer);
-  const add = button('Add a box', () => app.addBox(), { key: 'Shift+Insert', title: 'Add a box of half a metre in the middle of the picture' });
+  const add = button('Add a box', () => app.addBox(), { key: 'Shift+Insert', title: 'Add a box, half a metre wide in rooms for people, below the middle of the picture' });
   return section('thing', 'Selected', true, el('div', { class: 'row' }, list, add), none, body);
 }

@@ -1,21 +1,28 @@
-//! Objects that are added to a scene while it is watched: furniture as boxes, lamps as rectangles.
+//! Objects that are added to a scene while it is watched: boxes and rectangles, such as furniture and lamps.
 
+use super::MOST_INTENSITY;
 use glam::DVec3;
 use radiosity_scene::elements::division_of;
 use radiosity_scene::material::MAX_REFLECTANCE;
 use radiosity_scene::{Bands, Material, Scene};
+use radiosity_transport::live::REACH;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 
-/// Most exitance of an object that is added, lm/m² per band.
-pub const MOST_EXITANCE: f32 = 1e12;
+/// Least exitance of a band of a lamp, lm/m²: in every form that it may get, it is a lamp in single precision.
+const LEAST_EXITANCE: f32 = 1e-12;
 
-/// Least length of an object that is added, as a share of half the extent of the scene: what is thinner is lost in the
-/// rounding of rays.
+/// Least length of an object that is added, as a share of half the extent of the scene: a hundred times what rays begin off
+/// a surface, so that few of them end within what is thin.
 const LEAST_LENGTH: f64 = 1e-4;
 
-/// Letters of the name of what is added.
-pub const LONGEST_NAME: usize = 200;
+/// Most length, likewise: from one end to the other of where objects may be.
+const MOST_LENGTH: f64 = 2.0 * REACH;
+
+/// What is wrong with the name of what is added.
+pub fn name_fault(name: &str) -> Option<&'static str> {
+    (name.chars().count() > 200).then_some("its name is longer than 200 letters")
+}
 
 /// A form, about its middle, in its own axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,13 +41,14 @@ pub enum Form {
 }
 
 /// What is wrong with lengths.
-const LENGTHS: &str = "its lengths are no numbers, negative, or below a ten thousandth of half the scene's extent";
+const LENGTHS: &str =
+    "a length is no number, below a ten thousandth of half the scene's extent, or above eight times that";
 
 impl Form {
     /// What is wrong with it in a scene of half such an extent, metres.
     pub fn fault(&self, half: f64) -> Option<&'static str> {
         // Written so that what is no number is refused, too.
-        let is_sound = |length: &f64| (LEAST_LENGTH * half..f64::INFINITY).contains(length);
+        let is_sound = |length: &f64| (LEAST_LENGTH * half..=MOST_LENGTH * half).contains(length);
         (!self.lengths().iter().all(is_sound)).then_some(LENGTHS)
     }
 
@@ -100,29 +108,27 @@ pub struct NewObject {
     /// Exitance, lm/m² per band; none unless it is a lamp.
     #[serde(default)]
     pub emission: Bands,
-    /// From its own axes to the world, by columns.
+    /// From its own axes to the world, by columns: turned and moved, lengths as they are.
     pub matrix: [f64; 16],
 }
 
 impl NewObject {
     /// What is wrong with it in a scene of half such an extent, metres, but for its place.
     pub fn fault(&self, half: f64) -> Option<&'static str> {
-        if self.name.chars().count() > LONGEST_NAME {
-            return Some("its name is longer than 200 letters");
-        }
         // Written so that what is no number is refused, too.
         if !self.reflectance.iter().all(|rho| (0.0..=MAX_REFLECTANCE).contains(rho)) {
             return Some("its reflectance is not within 0 and 0.99");
         }
-        if !self.emission.iter().all(|exitance| (0.0..=MOST_EXITANCE).contains(exitance)) {
-            return Some("its emission is negative, above 1e12 lm/m² or no number");
+        let is_sound = |exitance: &f32| *exitance == 0.0 || (LEAST_EXITANCE..=MOST_INTENSITY).contains(exitance);
+        if !self.emission.iter().all(is_sound) {
+            return Some("its emission is no number, negative, above 1e12 lm/m², or above 0 and below 1e-12");
         }
-        self.form.fault(half)
+        name_fault(&self.name).or_else(|| self.form.fault(half))
     }
 
     /// Whether it is a lamp.
     pub fn shines(&self) -> bool {
-        self.emission.iter().any(|exitance| *exitance > 0.0)
+        self.material().emits()
     }
 
     /// Its material.

@@ -112,20 +112,21 @@ pub enum Edit {
         object: Box<NewObject>,
     },
     /// Gives an object that was added another form, and a lamp as many lumens as it had. It becomes another, which gets the
-    /// next free id ([`Applied::added`]): edits of the old one are edits of it from now on.
+    /// next free id ([`Applied::added`]): edits of the old one are edits of it from now on, a move places the form that it has
+    /// by then. The memory of the old form stays taken, for the way back.
     Reshape {
         /// The object.
         object: ObjectId,
         /// What it becomes.
         form: Form,
-        /// From its own axes to the world.
+        /// From its own axes to the world: turned and moved, lengths as they are.
         matrix: [f64; 16],
     },
-    /// Takes [`Edit::Reshape`] back, or makes it again: an object is again what it was before it became another.
+    /// Takes [`Edit::Reshape`] back, or makes it again.
     Exchange {
         /// The object that is there.
         gone: ObjectId,
-        /// The one that became it.
+        /// The one that became it, and takes its place.
         back: ObjectId,
     },
     /// Adds a copy of an object, which gets the next free id ([`Applied::added`]).
@@ -209,6 +210,9 @@ pub enum EditError {
     /// A matrix that is no placement.
     #[error("the matrix is no placement: its last row is {0:?}, not [0, 0, 0, 1]")]
     NotAffine([f64; 4]),
+    /// A matrix that changes lengths, of what has lengths of its own.
+    #[error("the matrix changes lengths or mirrors; the form has the lengths")]
+    NotRigid,
     /// A matrix that mirrors, flattens, or scales by more than a thousand.
     #[error("the matrix has the determinant {0}: it mirrors the object, or makes it too small or too large")]
     Determinant(f64),

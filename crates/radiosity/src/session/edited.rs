@@ -1,13 +1,12 @@
-//! Edits are checked as a whole, then carried out; and the scene as they leave it.
+//! Edits are checked as a whole, then carried out.
 
-use super::added::{LONGEST_NAME, add_to};
+use super::added::{add_to, name_fault};
 use super::edit::{Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
-use super::light::{Light, distance, kind_of};
-use super::paint::brighter;
+use super::light::{Light, distance, is_direct, kind_of};
 use super::{Form, LightId, MOST_COLUMNS, ObjectId, Placed, Session, bytes};
-use glam::{DAffine3, DMat4, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3};
 use radiosity_scene::material::MAX_REFLECTANCE;
-use radiosity_scene::{Bands, Material, PointLight, PointLightKind, Scene, Sky, Source};
+use radiosity_scene::{Bands, Material, PointLight, PointLightKind};
 use radiosity_transport::live::{REACH, World};
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -38,6 +37,7 @@ struct Known {
     present: Vec<bool>,
     origin: Vec<Origin>,
     successor: Vec<Option<usize>>,
+    shines: Vec<bool>,
     lights: Vec<KnownLight>,
     elements: usize,
 }
@@ -47,21 +47,27 @@ struct Known {
 enum Origin {
     /// An object that is there already.
     Body(usize),
-    /// One that the series adds: its corners in its own axes, its elements, whether it shines.
-    New(Rc<[DVec3]>, usize, bool),
+    /// One that the series adds: its corners in its own axes, and its elements.
+    New(Rc<[DVec3]>, usize),
 }
 
 impl Known {
+    /// An object becomes another, which has its light from then on.
+    fn succeed(&mut self, old: usize, new: usize) {
+        (self.successor[old], self.successor[new]) = (Some(new), None);
+        (self.present[old], self.present[new]) = (false, true);
+        self.shines[new] = std::mem::take(&mut self.shines[old]);
+    }
+
     /// What an object is by now.
-    fn now(&self, object: ObjectId) -> usize {
+    fn current(&self, object: ObjectId) -> usize {
         latest(object, |index| self.successor.get(index).copied().flatten())
     }
 }
 
 impl Origin {
-    fn of_form(form: &Form, world: &World, shines: bool) -> Origin {
-        let corners = form.triangles().into_iter().flatten().collect();
-        Origin::New(corners, form.elements(world.element_size()), shines)
+    fn of_form(form: &Form, world: &World) -> Origin {
+        Origin::New(form.triangles().into_iter().flatten().collect(), form.elements(world.element_size))
     }
 }
 
@@ -114,6 +120,7 @@ impl Session {
             present: bodies.iter().map(|body| body.is_present).collect(),
             origin: (0..bodies.len()).map(Origin::Body).collect(),
             successor: self.objects.iter().map(|object| object.successor).collect(),
+            shines: self.objects.iter().map(|object| object.light.is_some()).collect(),
             lights: self
                 .lights
                 .iter()
@@ -133,7 +140,7 @@ impl Session {
 
     fn check_one(&self, edit: &Edit, known: &mut Known) -> Result<(), EditError> {
         let there = |object: ObjectId, known: &Known| {
-            let now = known.now(object);
+            let now = known.current(object);
             match known.present.get(now) {
                 None => Err(EditError::UnknownObject(object)),
                 Some(false) => Err(EditError::Deleted(object)),
@@ -209,17 +216,21 @@ impl Session {
                 known.lights[light.0 as usize].is_gone = false;
             }
             Edit::Copy { object, matrix } => {
-                let (_, origin) = there(*object, known)?;
+                let (now, origin) = there(*object, known)?;
                 self.check_place(*object, &origin, matrix)?;
-                self.check_object(origin, known)?;
+                self.check_object(origin, known.shines[now], known)?;
             }
             Edit::Add { object } => {
                 if let Some(why) = object.fault(world.half) {
                     return Err(EditError::NewObject(why));
                 }
-                let origin = Origin::of_form(&object.form, world, object.shines());
-                self.check_place(ObjectId(known.present.len() as u32), &origin, &object.matrix)?;
-                self.check_object(origin, known)?;
+                let origin = Origin::of_form(&object.form, world);
+                check_rigid(&object.matrix)?;
+                self.check_place(id(known.present.len()), &origin, &object.matrix).map_err(|error| match error {
+                    EditError::TooFar { .. } => EditError::NewObject(TOO_FAR),
+                    other => other,
+                })?;
+                self.check_object(origin, object.shines(), known)?;
             }
             Edit::Reshape { object, form, matrix } => {
                 let (now, origin) = there(*object, known)?;
@@ -231,12 +242,12 @@ impl Session {
                 if let Some(why) = fault {
                     return Err(EditError::Form { object: *object, why });
                 }
-                // Its light goes on.
-                let origin = Origin::of_form(form, world, false);
+                let origin = Origin::of_form(form, world);
+                check_rigid(matrix)?;
                 self.check_place(*object, &origin, matrix)?;
-                known.successor[now] = Some(known.present.len());
-                known.present[now] = false;
-                self.check_object(origin, known)?;
+                let new = known.present.len();
+                self.check_object(origin, false, known)?;
+                known.succeed(now, new);
             }
             Edit::Exchange { gone, back } => {
                 let (gone_now, back_now) = (gone.0 as usize, back.0 as usize);
@@ -245,15 +256,14 @@ impl Session {
                     return Err(EditError::NotExchanged { gone: *gone, back: *back });
                 }
                 there(*gone, known)?;
-                (known.successor[back_now], known.successor[gone_now]) = (None, Some(back_now));
-                (known.present[back_now], known.present[gone_now]) = (true, false);
+                known.succeed(gone_now, back_now);
             }
             Edit::Delete { object } => {
                 let (now, _) = there(*object, known)?;
                 known.present[now] = false;
             }
             Edit::Restore { object } => {
-                let now = known.now(*object);
+                let now = known.current(*object);
                 match known.present.get_mut(now) {
                     None => return Err(EditError::UnknownObject(*object)),
                     Some(true) => return Err(EditError::NotDeleted(*object)),
@@ -273,16 +283,15 @@ impl Session {
     }
 
     /// Whether there is room for another object, and its light.
-    fn check_object(&self, origin: Origin, known: &mut Known) -> Result<(), EditError> {
-        let (elements, shines) = match &origin {
-            Origin::Body(body) => {
-                (self.live.world().bodies[*body].elements() as usize, self.objects[*body].light.is_some())
-            }
-            Origin::New(_, elements, shines) => (*elements, *shines),
+    fn check_object(&self, origin: Origin, shines: bool, known: &mut Known) -> Result<(), EditError> {
+        let elements = match &origin {
+            Origin::Body(body) => self.live.world().bodies[*body].elements() as usize,
+            Origin::New(_, elements) => *elements,
         };
         known.present.push(true);
         known.origin.push(origin);
         known.successor.push(None);
+        known.shines.push(shines);
         self.check_more(known, elements + 1, shines.then_some(KnownLight { is_gone: false, lamp: None }))
     }
 
@@ -302,8 +311,8 @@ impl Session {
     fn check_light(&self, light: &NewLight) -> Result<KnownLamp, EditError> {
         let world = self.live.world();
         let refuse = |why| Err(EditError::NewLight(why));
-        if light.name.chars().count() > LONGEST_NAME {
-            return refuse("its name is longer than 200 letters");
+        if let Some(why) = name_fault(&light.name) {
+            return refuse(why);
         }
         if light.position.iter().chain(&light.direction).any(|x| !x.is_finite()) {
             return refuse("its position or direction has a number that is not finite");
@@ -348,7 +357,7 @@ impl Session {
                 inverse
             }
             Edit::Reflectance { object, reflectance } => {
-                let index = self.now(*object);
+                let index = self.current(*object);
                 let own = &mut self.objects[index];
                 let before = own.coat.unwrap_or(own.paint.mean);
                 own.coat = (*reflectance != own.paint.mean).then_some(*reflectance);
@@ -357,7 +366,7 @@ impl Session {
                 Edit::Reflectance { object: id(index), reflectance: before }
             }
             Edit::Move { object, matrix } => {
-                let index = self.now(*object);
+                let index = self.current(*object);
                 let before = std::mem::replace(&mut self.objects[index].matrix, *matrix);
                 self.live.place(index, affine(matrix));
                 self.touch(index, done);
@@ -406,7 +415,7 @@ impl Session {
                 Edit::DeleteLight { light: *light }
             }
             Edit::Copy { object, matrix } => {
-                let copied = self.now(*object);
+                let copied = self.current(*object);
                 let original = self.objects[copied].clone();
                 let added = self.live.copy(copied, affine(matrix));
                 let light = original.light.map(|light| Light { body: Some(added), ..self.lights[light].clone() });
@@ -424,14 +433,16 @@ impl Session {
                 self.put_object(Placed { group, ..placed }, light, done)
             }
             Edit::Reshape { object, form, matrix } => {
-                let old = self.now(*object);
-                let Placed { source, form: before, coat, group, .. } = self.objects[old].clone();
+                let old = self.current(*object);
+                let Placed { source, coat, group, .. } = self.objects[old].clone();
                 let (name, material) = {
                     let object = &self.scene().objects[source];
                     (object.name.clone(), self.scene().materials[object.material].clone())
                 };
-                // As many lumens as before.
-                let share = before.map_or(1.0, |before| before.area() / form.area()) as f32;
+                // As many lumens as before, where it is.
+                let body = &self.live.world().bodies[old];
+                let area: f64 = (0..body.elements()).map(|element| body.area(element)).sum();
+                let share = (area / form.area()) as f32;
                 let material = Material { emissive: material.emissive.map(|emissive| share * emissive), ..material };
                 let placed = self.make(&name, material, *form, *matrix);
                 let new = self.objects.len();
@@ -447,13 +458,13 @@ impl Session {
                 Edit::Exchange { gone: *back, back: *gone }
             }
             Edit::Delete { object } => {
-                let index = self.now(*object);
+                let index = self.current(*object);
                 self.live.remove(index);
                 self.touch(index, done);
                 Edit::Restore { object: id(index) }
             }
             Edit::Restore { object } => {
-                let index = self.now(*object);
+                let index = self.current(*object);
                 self.live.place(index, affine(&self.objects[index].matrix));
                 self.touch(index, done);
                 Edit::Delete { object: id(index) }
@@ -485,7 +496,7 @@ impl Session {
     }
 
     /// What an object is by now.
-    fn now(&self, object: ObjectId) -> usize {
+    fn current(&self, object: ObjectId) -> usize {
         latest(object, |index| self.objects.get(index).and_then(|placed| placed.successor))
     }
 
@@ -504,6 +515,9 @@ impl Session {
         self.objects[new].light = self.objects[old].light.take();
         if let Some(light) = self.objects[new].light {
             self.lights[light].body = Some(new);
+            // As bright as it is now.
+            self.lights[light].is_direct = is_direct(&self.live.world().bodies[new].shape, self.mean_exitance);
+            self.make_column(light);
         }
     }
 
@@ -534,122 +548,6 @@ impl Session {
         if let Some(light) = self.objects[index].light {
             done.strands.insert(self.lights[light].strand);
         }
-    }
-
-    /// The scene as it is edited now, to be written to a file: what was moved is where it is, what was painted has materials of
-    /// its own, and what was taken away is gone. Lights that were dimmed give as much as they do.
-    pub fn edited_scene(&self) -> Scene {
-        let from = self.scene();
-        let mut scene = Scene {
-            positions: Vec::new(),
-            normals: Vec::new(),
-            uvs: Default::default(),
-            colors: Vec::new(),
-            triangles: Vec::new(),
-            triangle_object: Vec::new(),
-            triangle_source: Vec::new(),
-            objects: Vec::new(),
-            lights: Vec::new(),
-            ..from.clone()
-        };
-        // Pictures that were painted brighter: which, by how much, and where the new one is.
-        let mut painted: Vec<(usize, [f32; 3], usize)> = Vec::new();
-        for (index, (placed, body)) in self.objects.iter().zip(&self.live.world().bodies).enumerate() {
-            if !body.is_present {
-                continue;
-            }
-            let object = &from.objects[placed.source];
-            let (vertices, triangles) = (object.vertices.clone(), object.triangles.clone());
-            let (first_vertex, first_triangle) = (scene.positions.len(), scene.triangles.len());
-            let turned = DMat4::from(body.matrix).inverse().transpose();
-            scene.positions.extend(from.positions[vertices.clone()].iter().map(|p| body.matrix.transform_point3(*p)));
-            scene.normals.extend(from.normals[vertices.clone()].iter().map(|n| {
-                if body.matrix == DAffine3::IDENTITY {
-                    *n
-                } else {
-                    turned.transform_vector3(n.as_dvec3()).normalize_or_zero().as_vec3()
-                }
-            }));
-            for (to, from) in scene.uvs.iter_mut().zip(&from.uvs) {
-                to.extend(from.get(vertices.clone()).into_iter().flatten());
-            }
-            scene.colors.extend(from.colors.get(vertices.clone()).into_iter().flatten());
-            let shifted = |v: u32| (v as usize - vertices.start + first_vertex) as u32;
-            scene.triangles.extend(from.triangles[triangles.clone()].iter().map(|t| t.map(shifted)));
-            scene.triangle_object.extend(triangles.clone().map(|_| scene.objects.len() as u32));
-            scene.triangle_source.extend(&from.triangle_source[triangles.clone()]);
-
-            let mut material = from.materials[object.material].clone();
-            let is_as_it_was = material.clone();
-            if let Some(coat) = placed.coat {
-                // What is above the most that a colour may be goes into the picture, or into the colours of vertices.
-                let mut excess = [1.0f32; 3];
-                for (band, excess) in excess.iter_mut().enumerate() {
-                    let (coat, mean) = (coat[band], placed.paint.mean[band]);
-                    let keeps_pattern = placed.paint.is_varied && mean > 0.0;
-                    let wanted = if keeps_pattern { material.base_color[band] * (coat / mean) } else { coat };
-                    material.base_color[band] = wanted.min(1.0);
-                    *excess = wanted.max(1.0);
-                }
-                if let Some(texture) = material.base_color_texture.as_mut().filter(|_| excess != [1.0; 3]) {
-                    let known = painted.iter().find(|known| (known.0, known.1) == (texture.texture, excess));
-                    texture.texture = match known {
-                        Some((.., made)) => *made,
-                        None => {
-                            let made = scene.textures.len();
-                            scene.textures.push(brighter(&from.textures[texture.texture], excess));
-                            painted.push((texture.texture, excess, made));
-                            made
-                        }
-                    };
-                } else if !scene.colors.is_empty() {
-                    for colour in &mut scene.colors[first_vertex..] {
-                        (0..3).for_each(|band| colour[band] = (colour[band] * excess[band]).min(1.0));
-                    }
-                }
-                if !placed.paint.is_varied {
-                    material.metallic = 0.0;
-                }
-            }
-            if let Some(light) = placed.light {
-                let factor = self.lights[light].factor();
-                (0..3).for_each(|band| material.emissive[band] *= factor[band]);
-            }
-            let material = if material == is_as_it_was {
-                object.material
-            } else {
-                scene.materials.push(material);
-                scene.materials.len() - 1
-            };
-            let is_new = index >= self.handed_in;
-            let source = if is_new { Source { node: index, mesh: index, ..Source::default() } } else { object.source };
-            scene.objects.push(radiosity_scene::Object {
-                name: object.name.clone(),
-                material,
-                triangles: first_triangle..scene.triangles.len(),
-                vertices: first_vertex..scene.positions.len(),
-                source,
-            });
-        }
-        for light in self.lights.iter().filter(|light| !light.is_gone) {
-            let factor = light.factor();
-            if let Some(mut point) = light.placed() {
-                (0..3).for_each(|band| point.intensity[band] *= factor[band]);
-                scene.lights.push(point);
-            } else if light.kind == super::LightKind::Sky {
-                let dim = |l: radiosity_scene::Bands| std::array::from_fn(|band| l[band] * factor[band]);
-                scene.sky = match &from.sky {
-                    Sky::Black => Sky::Black,
-                    Sky::Uniform(l) => Sky::Uniform(dim(*l)),
-                    Sky::Overcast { horizontal } => Sky::Overcast { horizontal: dim(*horizontal) },
-                    Sky::Map { width, height, pixels } => {
-                        let pixels = pixels.iter().map(|l| dim(*l)).collect();
-                        Sky::Map { width: *width, height: *height, pixels }
-                    }
-                };
-            }
-        }
-        scene
     }
 
     /// The light with a number.
@@ -686,6 +584,17 @@ fn id(index: usize) -> ObjectId {
 fn affine(matrix: &[f64; 16]) -> DAffine3 {
     DAffine3::from_mat4(DMat4::from_cols_array(matrix))
 }
+
+/// Whether a matrix turns and moves things, and no more: columns of unit length, square to each other to the right.
+fn check_rigid(matrix: &[f64; 16]) -> Result<(), EditError> {
+    let turned = check_matrix(matrix)?.matrix3;
+    let off = turned.transpose() * turned - DMat3::IDENTITY;
+    // Written so that what is no number is refused, too.
+    if off.to_cols_array().iter().all(|x| x.abs() <= UNTURNED) { Ok(()) } else { Err(EditError::NotRigid) }
+}
+
+/// Rounding of the columns of a matrix that has been turned a thousand times.
+const UNTURNED: f64 = 1e-6;
 
 /// Whether a matrix places things as they are, turned, or larger.
 fn check_matrix(matrix: &[f64; 16]) -> Result<DAffine3, EditError> {

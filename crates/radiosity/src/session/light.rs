@@ -123,7 +123,7 @@ pub fn mean_exitance(live: &Live) -> f64 {
 
 /// Whether an object shines so brightly beside a mean that shadow rays go to it: as luminaires of batch work, by the
 /// brightest of its triangles; and what rows would not get right, emission that varies within triangles.
-fn is_direct(shape: &Shape, mean_exitance: f64) -> bool {
+pub fn is_direct(shape: &Shape, mean_exitance: f64) -> bool {
     let peak = shape.exitance.iter().map(|e| luminance(*e)).fold(0f32, f32::max);
     shape.is_varied || shape.is_see_through || f64::from(peak) > BRIGHT * mean_exitance
 }

@@ -43,10 +43,11 @@ mod paint;
 mod plane;
 mod probe;
 mod rectangle;
+mod saved;
 mod solve;
 mod state;
 
-pub use added::{Form, MOST_EXITANCE, NewObject};
+pub use added::{Form, NewObject};
 pub use edit::{Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 pub use plane::{Plane, PlaneError, PlaneFigures, PlanePoint, PlaneQuestion, PlaneReading};
@@ -125,7 +126,8 @@ pub struct Status {
 /// A scene that is lit while it is looked at and changed while it is lit.
 pub struct Session {
     live: Live,
-    /// Objects of the scene as it was handed in, and their mean exitance, lm/m².
+    /// Objects of the scene as it was handed in, and their mean exitance, lm/m²: beside it is judged what is added, so that
+    /// a lamp near the limit may be judged otherwise in the edited scene, where others count in.
     handed_in: usize,
     mean_exitance: f64,
     objects: Vec<Placed>,
@@ -243,10 +245,14 @@ impl Session {
         if let Some(body) = light.body {
             self.objects[body].light = Some(index);
         }
-        let is_direct = light.is_direct;
         light.strand = light::strand_of(&mut self.strands, index);
-        let strand = light.strand;
         self.lights.push(light);
+        self.make_column(index);
+    }
+
+    /// A light to which shadow rays go needs a column.
+    fn make_column(&mut self, light: usize) {
+        let Light { strand, is_direct, .. } = self.lights[light];
         if is_direct {
             if self.strands[strand].column.is_none() {
                 self.strands[strand].column = Some(self.live.add_column(strand as u32, &[]));

@@ -25,7 +25,7 @@ pub struct World {
     /// The scene as handed in, with what was added since: numbers of triangles refer to it.
     pub scene: Arc<Scene>,
     /// Width of an element, metres.
-    size: f64,
+    pub element_size: f64,
     /// The objects; those taken away too.
     pub bodies: Vec<Body>,
     /// The sky's patches, which have the first ids.
@@ -85,7 +85,7 @@ impl World {
             is_opaque: true,
             ids: sky.len() as u32,
             scene,
-            size,
+            element_size: size,
         };
         for object in 0..world.scene.objects.len() {
             world.add(world.shape(object), DAffine3::IDENTITY);
@@ -101,12 +101,7 @@ impl World {
 
     /// An object of the scene, cut into elements.
     pub fn shape(&self, object: usize) -> Arc<Shape> {
-        Arc::new(Shape::new(&self.scene, object, self.size))
-    }
-
-    /// Width of an element, metres.
-    pub fn element_size(&self) -> f64 {
-        self.size
+        Arc::new(Shape::new(&self.scene, object, self.element_size))
     }
 
     /// Adds an object, without a tree; answers its number.
