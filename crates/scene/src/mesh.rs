@@ -9,12 +9,16 @@ mod boxes;
 mod contacts;
 mod cut;
 mod edges;
+mod weld;
 
 use crate::{Scene, Surface};
 use contacts::Contacts;
-use edges::{is_balanced, ordered, sides_of_edges};
+pub use edges::EdgeSide;
+use edges::{is_balanced, ordered};
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+use weld::Weld;
 
 /// Vertices closer than this share of the scene's largest extent are one vertex. Single precision resolves 6e-8 of
 /// it; exporters that place instances by single-precision matrices miss by some 3e-7. Ten times more would weld
@@ -222,7 +226,7 @@ impl Mesh {
     /// others, for the edges there and the vertices there too.
     fn hanging_vertices(&self, contacts: &Contacts) -> FxHashMap<(u32, u32), Vec<u32>> {
         // A surface's inner edges are walked once each way.
-        let sides = sides_of_edges(&self.triangles, self.vertices.len());
+        let sides = self.sides_of_edges();
         let unbalanced = sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| !is_balanced(faces));
         let mut loose: Vec<(u32, u32)> = unbalanced.map(|faces| faces[0].edge).collect();
         loose.extend(contacts.edges.iter().filter(|edge| sides.binary_search_by_key(edge, |side| &side.edge).is_ok()));
@@ -285,9 +289,9 @@ impl Mesh {
 
     /// Joins the corners around each vertex across the edges at which the surface is smooth.
     fn smoothen(&mut self, scene: &Scene) {
-        let normals: Vec<DVec3> = (0..self.triangles.len()).map(|t| self.normal(t)).collect();
+        let normals: Vec<DVec3> = (0..self.triangles.len()).into_par_iter().map(|t| self.normal(t)).collect();
         let mut joined = Union::new(3 * self.triangles.len());
-        let all = sides_of_edges(&self.triangles, self.vertices.len());
+        let all = self.sides_of_edges();
         for sides in all.chunk_by(|a, b| a.edge == b.edge) {
             if sides.len() > MAX_FACES_ON_EDGE {
                 continue;
@@ -309,16 +313,9 @@ impl Mesh {
                 }
             }
         }
-        let mut number = FxHashMap::default();
-        self.smooth = (0..self.triangles.len())
-            .map(|t| {
-                std::array::from_fn(|i| {
-                    let next = number.len() as u32;
-                    *number.entry(joined.root(3 * t + i)).or_insert(next)
-                })
-            })
-            .collect();
-        self.smooth_count = number.len();
+        let names = joined.names();
+        self.smooth_count = names.iter().map(|name| *name as usize + 1).max().unwrap_or_default();
+        self.smooth = names.as_chunks::<3>().0.to_vec();
     }
 
     /// Whether a surface stands on the edge `i` of triangle `t` between it and its neighbour `s`, where both are lit: a
@@ -374,41 +371,6 @@ fn weld_distance(scene: &Scene) -> f64 {
     (extent * WELD).max(f64::MIN_POSITIVE)
 }
 
-/// Finds vertices by their place. The first of a cluster represents it.
-struct Weld {
-    tolerance: f64,
-    grid: FxHashMap<[i64; 3], Vec<u32>>,
-}
-
-impl Weld {
-    fn new(tolerance: f64) -> Weld {
-        Weld { tolerance, grid: FxHashMap::default() }
-    }
-
-    /// The vertex at a place, added where there is none.
-    fn vertex(&mut self, vertices: &mut Vec<DVec3>, p: DVec3) -> u32 {
-        let (tolerance, cell) = (self.tolerance, 2.0 * self.tolerance);
-        // The cells within the tolerance of p: two at most along each axis.
-        let low = ((p - DVec3::splat(tolerance)) / cell).floor().as_i64vec3();
-        let high = ((p + DVec3::splat(tolerance)) / cell).floor().as_i64vec3();
-        for x in low.x..=high.x {
-            for y in low.y..=high.y {
-                for z in low.z..=high.z {
-                    for &v in self.grid.get(&[x, y, z]).into_iter().flatten() {
-                        if vertices[v as usize].distance_squared(p) <= tolerance * tolerance {
-                            return v;
-                        }
-                    }
-                }
-            }
-        }
-        let v = vertices.len() as u32;
-        vertices.push(p);
-        self.grid.entry((p / cell).floor().as_i64vec3().to_array()).or_default().push(v);
-        v
-    }
-}
-
 /// Disjoint sets with path halving.
 struct Union(Vec<u32>);
 
@@ -429,6 +391,19 @@ impl Union {
         let (a, b) = (self.root(a), self.root(b));
         let (low, high) = (a.min(b), a.max(b));
         self.0[high as usize] = low;
+    }
+
+    /// The number of the set that each is in, in the order of their first members.
+    fn names(mut self) -> Vec<u32> {
+        let mut next = 0;
+        let mut names: Vec<u32> = Vec::with_capacity(self.0.len());
+        for i in 0..self.0.len() {
+            // The root of a set is its first member.
+            let root = self.root(i) as usize;
+            names.push(if root < i { names[root] } else { next });
+            next += u32::from(root == i);
+        }
+        names
     }
 }
 

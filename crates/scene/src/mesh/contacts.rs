@@ -13,10 +13,13 @@
 
 use super::boxes::Boxes;
 use super::cut::Cutter;
-use super::edges::{is_balanced, ordered, sides_of_edges};
-use super::{CREASE, Mesh, STANDING, Union, WHOLE, Weld};
+use super::edges::{is_balanced, ordered};
+use super::weld::Weld;
+use super::{CREASE, Mesh, STANDING, Union, WHOLE};
 use crate::{AlphaMode, Scene};
 use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Contacts cut where they reach this far, together with those that go on from them about straight on, in widths of an
 /// element: what is shorter cannot part rooms, and an element lies around it anyway. At half of it the books of a furnished
@@ -44,6 +47,9 @@ const LEAST_SEARCH: u64 = 1 << 27;
 const CONTACTS: usize = 2;
 const LEAST_CONTACTS: usize = 1 << 16;
 
+/// Boxes whose contacts are searched for at the same time: enough work for many threads, and little to repeat.
+const AT_ONCE: usize = 4096;
+
 /// Pairs of contacts on one triangle that are compared; where there are more it is cut.
 const MOST_COMPARED: usize = 1 << 12;
 
@@ -60,11 +66,15 @@ pub(super) struct Contacts {
 struct Contact {
     host: u32,
     other: u32,
-    ends: [DVec3; 2],
-    /// The other triangle's edge, where it is one.
-    edge: Option<(u32, u32)>,
-    /// The unit normal of the other triangle, if all is dark on its back.
-    front: Option<DVec3>,
+    line: Line,
+}
+
+/// Where a contact is: millions are kept in a scene in which all goes through all.
+enum Line {
+    /// An edge of the other triangle, by its vertices.
+    Edge(u32, u32),
+    /// The line between two places, in which the triangles cross.
+    Crossing([DVec3; 2]),
 }
 
 impl Mesh {
@@ -79,11 +89,13 @@ impl Mesh {
         // only where both have their vertices on it.
         let parted: Vec<u32> = list
             .chunk_by(|a, b| a.host == b.host)
-            .filter(|run| parts(run, self.tolerance))
+            .filter(|run| self.parts(scene, run))
             .map(|run| run[0].host)
             .collect();
         let is_parted = |t: u32| parted.binary_search(&t).is_ok();
-        list.retain(|contact| is_parted(contact.host) || (contact.edge.is_none() && is_parted(contact.other)));
+        list.retain(|contact| {
+            is_parted(contact.host) || (matches!(contact.line, Line::Crossing(_)) && is_parted(contact.other))
+        });
 
         // Cut them, each triangle in its place.
         let mut contacts = Contacts::default();
@@ -92,8 +104,9 @@ impl Mesh {
         for run in list.chunk_by(|a, b| a.host == b.host) {
             let host = run[0].host;
             let corners = self.triangles[host as usize];
-            let ends = |contact: &Contact| {
-                contact.edge.map_or_else(|| contact.ends.map(|p| cutter.vertex(p)), <[u32; 2]>::from)
+            let ends = |contact: &Contact| match contact.line {
+                Line::Edge(a, b) => [a, b],
+                Line::Crossing(ends) => ends.map(|p| cutter.vertex(p)),
             };
             let mut edges: Vec<(u32, u32)> = run.iter().map(ends).map(|[a, b]| ordered(a, b)).collect();
             edges.retain(|(a, b)| a != b);
@@ -114,54 +127,133 @@ impl Mesh {
 
     /// The contacts of all triangles, and whether these are all.
     fn contacts(&self, scene: &Scene) -> (Vec<Contact>, bool) {
-        let most = (SEARCH * self.triangles.len() as u64).max(LEAST_SEARCH);
+        let mut left = (SEARCH * self.triangles.len() as u64).max(LEAST_SEARCH);
         let most_kept = (CONTACTS * self.triangles.len()).max(LEAST_CONTACTS);
-        let mut list = Vec::new();
-        let found_all = Boxes::new(self).pairs(self.tolerance, most, |s, t| {
-            self.meet(scene, [s, t], &mut list);
-            list.len() < most_kept
-        });
-        (list, found_all)
+        let (boxes, mut list) = (Boxes::new(self), Vec::new());
+        // From the largest triangles down, so that what is not reached is clutter.
+        let mut end = boxes.leaves();
+        while end > 0 {
+            let homes = end.saturating_sub(AT_ONCE)..end;
+            end = homes.start;
+            if let Some(found) = self.contacts_within(scene, &boxes, homes.clone(), left, most_kept - list.len()) {
+                for (contacts, compared) in found {
+                    list.extend(contacts);
+                    left -= compared;
+                }
+                continue;
+            }
+            // A limit is here: one after the other, for it to be at the same place whatever the number of threads.
+            for home in homes.rev() {
+                let has_room = |s, t| {
+                    self.meet(scene, [s, t], &mut list);
+                    list.len() < most_kept
+                };
+                if !boxes.pairs(home, self.tolerance, &mut left, has_room) {
+                    return (list, false);
+                }
+            }
+        }
+        (list, true)
+    }
+
+    /// The contacts of the triangles in some boxes, from the last box on, and how many comparisons that took; none where the
+    /// limits do not allow for all of them.
+    fn contacts_within(
+        &self,
+        scene: &Scene,
+        boxes: &Boxes,
+        homes: std::ops::Range<usize>,
+        left: u64,
+        most_kept: usize,
+    ) -> Option<Vec<(Vec<Contact>, u64)>> {
+        let (kept, compared) = (AtomicUsize::new(0), AtomicU64::new(0));
+        homes
+            .into_par_iter()
+            .rev()
+            .map(|home| {
+                let (mut own, mut rest) = (Vec::new(), left);
+                let found_all = boxes.pairs(home, self.tolerance, &mut rest, |s, t| {
+                    self.meet(scene, [s, t], &mut own);
+                    own.len() < most_kept
+                });
+                let kept = kept.fetch_add(own.len(), Ordering::Relaxed) + own.len();
+                let compared = compared.fetch_add(left - rest, Ordering::Relaxed) + left - rest;
+                (found_all && kept < most_kept && compared <= left).then_some((own, left - rest))
+            })
+            .collect()
+    }
+
+    /// The ends of a contact.
+    fn ends(&self, contact: &Contact) -> [DVec3; 2] {
+        match contact.line {
+            Line::Edge(a, b) => [a, b].map(|v| self.vertices[v as usize]),
+            Line::Crossing(ends) => ends,
+        }
     }
 
     /// Keeps the contacts that extend over a length, with those that go on from them about straight on, and edges at which
     /// surfaces end.
     fn keep_long(&self, list: &mut Vec<Contact>, length: f64) {
         let (mut weld, mut places) = (Weld::new(self.tolerance), Vec::new());
-        // From each end the direction to the other one.
-        let mut ends: Vec<(u32, usize, DVec3)> = Vec::with_capacity(2 * list.len());
-        for (n, contact) in list.iter().enumerate() {
-            let [a, b] = contact.ends;
-            let along = (b - a).normalize_or_zero();
-            ends.extend([(weld.vertex(&mut places, a), n, along), (weld.vertex(&mut places, b), n, -along)]);
+        let at: Vec<u32> =
+            list.iter().flat_map(|contact| self.ends(contact)).map(|p| weld.vertex(&mut places, p)).collect();
+        let count = places.len();
+        drop((weld, places));
+
+        // The ends by their places: where the list of each place starts, and the contacts there.
+        let mut next = vec![0u32; count + 1];
+        at.iter().for_each(|place| next[*place as usize + 1] += 1);
+        for place in 0..count {
+            next[place + 1] += next[place];
         }
-        ends.sort_unstable_by_key(|end| (end.0, end.1));
+        let mut here = vec![0u32; at.len()];
+        for (end, place) in at.into_iter().enumerate() {
+            let slot = &mut next[place as usize];
+            here[*slot as usize] = end as u32 / 2;
+            *slot += 1;
+        }
+
         let mut runs = Union::new(list.len());
-        for here in ends.chunk_by(|a, b| a.0 == b.0) {
-            for (k, (_, n, along)) in here.iter().enumerate() {
-                for (_, m, back) in here[k + 1..].iter().take(MOST_JOINED) {
-                    if along.dot(*back).abs() > CREASE.cos() {
-                        runs.join(*n, *m);
+        let (mut start, mut along) = (0, Vec::new());
+        for &end in &next[..count] {
+            let here = &here[start..end as usize];
+            start = end as usize;
+            along.clear();
+            along.extend(here.iter().map(|n| {
+                let [a, b] = self.ends(&list[*n as usize]);
+                (b - a).normalize_or_zero()
+            }));
+            for (k, n) in here.iter().enumerate() {
+                for (m, back) in here.iter().zip(&along).skip(k + 1).take(MOST_JOINED) {
+                    if along[k].dot(*back).abs() > CREASE.cos() {
+                        runs.join(*n as usize, *m as usize);
                     }
                 }
             }
         }
-        let mut bounds = vec![[DVec3::INFINITY, DVec3::NEG_INFINITY]; list.len()];
-        for (n, contact) in list.iter().enumerate() {
-            let [low, high] = &mut bounds[runs.root(n) as usize];
-            for end in contact.ends {
+        drop((here, next));
+
+        let runs = runs.names();
+        let count = runs.iter().map(|run| *run as usize + 1).max().unwrap_or_default();
+        let mut bounds = vec![[DVec3::INFINITY, DVec3::NEG_INFINITY]; count];
+        for (contact, run) in list.iter().zip(&runs) {
+            let [low, high] = &mut bounds[*run as usize];
+            for end in self.ends(contact) {
                 (*low, *high) = (low.min(end), high.max(end));
             }
         }
-        let mut reach = (0..list.len()).map(|n| bounds[runs.root(n) as usize]).map(|[low, high]| low.distance(high));
-        let ends = self.ends_of_surfaces();
-        let is_end = |contact: &Contact| contact.edge.is_some_and(|(a, b)| ends.binary_search(&ordered(a, b)).is_ok());
+        let has_edges = list.iter().any(|contact| matches!(contact.line, Line::Edge(..)));
+        let ends = if has_edges { self.ends_of_surfaces() } else { Vec::new() };
+        let is_end =
+            |contact: &Contact| matches!(contact.line, Line::Edge(a, b) if ends.binary_search(&ordered(a, b)).is_ok());
+        let mut reach = runs.into_iter().map(|run| bounds[run as usize]).map(|[low, high]| low.distance(high));
         list.retain(|contact| reach.next().is_some_and(|reach| reach > length) || is_end(contact));
+        list.shrink_to_fit();
     }
 
     /// The edges at which a surface ends, in order.
     fn ends_of_surfaces(&self) -> Vec<(u32, u32)> {
-        let sides = sides_of_edges(&self.triangles, self.vertices.len());
+        let sides = self.sides_of_edges();
         let open = sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| !is_balanced(faces));
         open.map(|faces| faces[0].edge).collect()
     }
@@ -222,19 +314,14 @@ impl Mesh {
             lit && wide && material(pair[1 - host]).alpha_mode == AlphaMode::Opaque
         });
 
-        let fronts = [0, 1].map(|of| {
-            let double_sided = scene.material(self.source[pair[of] as usize] as usize).has_two_sides();
-            (!double_sided).then_some(normals[of])
-        });
-
         // An edge of the one that lies on the other, or else the line in which they cross.
         let edges = heights.map(|h| (0..3).find(|i| h[*i] == 0.0 && h[(i + 1) % 3] == 0.0));
         for (of, edge) in edges.iter().enumerate() {
             let (Some(i), true) = (edge, hosts[1 - of]) else { continue };
             let ends = [corners[of][*i], corners[of][(i + 1) % 3]];
             if length_within(ends, corners[1 - of], normals[1 - of], self.tolerance) > 2.0 * self.tolerance {
-                let edge = Some((names[of][*i], names[of][(i + 1) % 3]));
-                list.push(Contact { host: pair[1 - of], other: pair[of], ends, edge, front: fronts[of] });
+                let line = Line::Edge(names[of][*i], names[of][(i + 1) % 3]);
+                list.push(Contact { host: pair[1 - of], other: pair[of], line });
             }
         }
         if edges != [None, None] || !hosts.contains(&true) {
@@ -248,14 +335,33 @@ impl Mesh {
         let to = if place(&p[1]) < place(&q[1]) { p[1] } else { q[1] };
         if place(&to) - place(&from) > 2.0 * self.tolerance {
             let crossed = (0..2).filter(|host| hosts[*host]);
-            list.extend(crossed.map(|host| Contact {
-                host: pair[host],
-                other: pair[1 - host],
-                ends: [from, to],
-                edge: None,
-                front: fronts[1 - host],
-            }));
+            let line =
+                |host: usize| Contact { host: pair[host], other: pair[1 - host], line: Line::Crossing([from, to]) };
+            list.extend(crossed.map(line));
         }
+    }
+
+    /// Whether contacts on one triangle part what is lit of it: a surface that is lit on both sides does, and so do two that
+    /// look away from each other. Behind a single one-sided surface all is dark.
+    fn parts(&self, scene: &Scene, list: &[Contact]) -> bool {
+        // The ends of each, and the unit normal of the other triangle, if all is dark on its back.
+        let seen = |contact: &Contact| {
+            let double_sided = scene.material(self.source[contact.other as usize] as usize).has_two_sides();
+            (self.ends(contact), (!double_sided).then(|| self.normal(contact.other as usize)))
+        };
+        let list: Vec<([DVec3; 2], Option<DVec3>)> = list.iter().map(seen).collect();
+        let mut compared = 0;
+        list.iter().enumerate().any(|(n, (a, front))| {
+            let Some(front) = *front else { return true };
+            list[n + 1..].iter().any(|(b, other)| {
+                compared += 1;
+                let behind = |front: DVec3, of: &[DVec3; 2], all: &[DVec3; 2]| {
+                    all.iter().all(|end| (*end - of[0]).dot(front) <= self.tolerance)
+                };
+                compared > MOST_COMPARED
+                    || other.is_none_or(|other| front.dot(other) < 0.0 && behind(front, a, b) && behind(other, b, a))
+            })
+        })
     }
 
     /// Where the sides of a triangle go through a plane above which its corners have these heights, in order along a
@@ -271,23 +377,6 @@ impl Mesh {
         let (p, q) = (points.next()?, points.next()?);
         Some(if p.dot(along) <= q.dot(along) { [p, q] } else { [q, p] })
     }
-}
-
-/// Whether contacts on one triangle part what is lit of it: a surface that is lit on both sides does, and so do two that
-/// look away from each other. Behind a single one-sided surface all is dark.
-fn parts(list: &[Contact], tolerance: f64) -> bool {
-    let mut compared = 0;
-    list.iter().enumerate().any(|(n, a)| {
-        let Some(front) = a.front else { return true };
-        list[n + 1..].iter().any(|b| {
-            compared += 1;
-            let behind = |front: DVec3, of: &Contact, all: &Contact| {
-                all.ends.iter().all(|end| (*end - of.ends[0]).dot(front) <= tolerance)
-            };
-            compared > MOST_COMPARED
-                || b.front.is_none_or(|other| front.dot(other) < 0.0 && behind(front, a, b) && behind(other, b, a))
-        })
-    })
 }
 
 /// How much of a line in the plane of a triangle lies on it, or within a margin.

@@ -1,8 +1,8 @@
 //! A triangle cut along lines: what lies within the welding distance of each other is made one, lines are split where they
 //! meet, and the pieces are the constrained Delaunay triangles of the lines and the outline (Chew 1989).
 
-use super::Weld;
 use super::edges::ordered;
+use super::weld::Weld;
 use glam::{DVec2, DVec3};
 use rustc_hash::{FxHashMap, FxHashSet};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
