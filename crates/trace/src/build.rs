@@ -8,7 +8,8 @@
 //! A range of n triangles takes exactly 2n − 1 nodes, its left half right behind it, so both halves can be built at
 //! the same time in places known beforehand: the result does not depend on the number of threads.
 
-use crate::collapse::{Choice, choose};
+use crate::collapse::{Costs, choose};
+use crate::tree::WIDTH;
 use glam::{Vec3, Vec4};
 
 /// Planes per axis plus one. In a furnished room 16 make rays visit 4 % more nodes, 64 gain nothing.
@@ -84,7 +85,8 @@ pub(crate) struct Binary {
     pub hi: Vec3,
     pub count: u32,
     pub left: u32,
-    pub choice: Choice,
+    /// How it hangs below the wide tree's nodes: [`choose`].
+    pub slots: [u8; WIDTH - 1],
 }
 
 /// Sorts `items` into the order of the tree's leaves and returns its nodes, the root first.
@@ -97,35 +99,28 @@ pub(crate) fn build(items: &mut [Item]) -> Vec<Binary> {
     nodes
 }
 
-fn grow(items: &mut [Item], nodes: &mut [Binary], depth: usize) {
+/// Answers what the root costs the node above it, which no node keeps.
+fn grow(items: &mut [Item], nodes: &mut [Binary], depth: usize) -> Costs {
     let bounds = Bounds::of(items);
-    let node = Binary {
-        lo: bounds.lo.truncate(),
-        hi: bounds.hi.truncate(),
-        count: items.len() as u32,
-        left: 0,
-        choice: Choice::default(),
-    };
+    let node =
+        Binary { lo: bounds.lo.truncate(), hi: bounds.hi.truncate(), count: items.len() as u32, ..Binary::default() };
     if items.len() == 1 {
-        nodes[0] = choose(node, bounds.area(), None);
-        return;
+        let (slots, costs) = choose(1, bounds.area(), None);
+        nodes[0] = Binary { slots, ..node };
+        return costs;
     }
 
     let left = split(items, depth);
     let (left_items, right_items) = items.split_at_mut(left);
     let (root, rest) = nodes.split_at_mut(1);
     let (left_nodes, right_nodes) = rest.split_at_mut(2 * left - 1);
-    if left_items.len() + right_items.len() >= FORK {
-        rayon::join(|| grow(left_items, left_nodes, depth + 1), || grow(right_items, right_nodes, depth + 1));
-    } else {
-        grow(left_items, left_nodes, depth + 1);
-        grow(right_items, right_nodes, depth + 1);
-    }
-    root[0] = choose(
-        Binary { left: left as u32, ..node },
-        bounds.area(),
-        Some([&left_nodes[0].choice, &right_nodes[0].choice]),
-    );
+    let mut grow_left = || grow(left_items, left_nodes, depth + 1);
+    let mut grow_right = || grow(right_items, right_nodes, depth + 1);
+    let (on_left, on_right) =
+        if node.count as usize >= FORK { rayon::join(grow_left, grow_right) } else { (grow_left(), grow_right()) };
+    let (slots, costs) = choose(node.count, bounds.area(), Some([&on_left, &on_right]));
+    root[0] = Binary { left: left as u32, slots, ..node };
+    costs
 }
 
 /// Brings the items of the left child to the front; returns how many there are, at least one and not all.

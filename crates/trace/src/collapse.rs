@@ -21,31 +21,24 @@ const NODE: f32 = 1.0;
 /// more blocks, at 1.5 it is 2 % more and 12 % fewer: anywhere in between will do.
 const BLOCK: f32 = 0.8;
 
-/// How a subtree hangs below its parent: the costs C(n, 1..=7) and what attains them.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Choice {
-    cost: [f32; WIDTH - 1],
-    /// `[0]`: children given to the left side when this is a node of its own, 0 where it is a leaf.
-    /// `[i - 1]`: children out of i given to the left side, 0 where i − 1 do as well.
-    left: [u8; WIDTH - 1],
-}
+/// The costs C(n, 1..=7) of a subtree.
+pub(crate) type Costs = [f32; WIDTH - 1];
 
-/// Fills in the choice of a node, given those of its children.
-pub(crate) fn choose(mut node: Binary, area: f32, children: Option<[&Choice; 2]>) -> Binary {
-    let blocks = (node.count as usize).div_ceil(LANES);
+/// How a subtree of so many triangles hangs below its parent, and what it costs there, given the costs of its children.
+/// `[0]`: children given to the left side when this is a node of its own, 0 where it is a leaf.
+/// `[i - 1]`: children out of i given to the left side, 0 where i − 1 do as well.
+pub(crate) fn choose(count: u32, area: f32, children: Option<[&Costs; 2]>) -> ([u8; WIDTH - 1], Costs) {
+    let blocks = (count as usize).div_ceil(LANES);
     let leaf = if blocks <= MAX_BLOCKS { area * BLOCK * blocks as f32 } else { f32::INFINITY };
-    let choice = &mut node.choice;
-    let Some([l, r]) = children else {
-        choice.cost = [leaf; WIDTH - 1];
-        return node;
-    };
+    let (mut slots, mut costs) = ([0; WIDTH - 1], [leaf; WIDTH - 1]);
+    let Some([l, r]) = children else { return (slots, costs) };
 
     // The cheapest way to hand i children to the two sides; costs that are not finite still leave a valid choice.
     let share = |i: usize| {
         let mut best = (f32::INFINITY, 1);
         for k in 1..i {
             if k < WIDTH && i - k < WIDTH {
-                let cost = l.cost[k - 1] + r.cost[i - k - 1];
+                let cost = l[k - 1] + r[i - k - 1];
                 if cost < best.0 {
                     best = (cost, k as u8);
                 }
@@ -55,26 +48,29 @@ pub(crate) fn choose(mut node: Binary, area: f32, children: Option<[&Choice; 2]>
     };
     let (below, k) = share(WIDTH);
     let inner = below + area * NODE;
-    (choice.cost[0], choice.left[0]) = if blocks <= MAX_BLOCKS && leaf <= inner { (leaf, 0) } else { (inner, k) };
+    (costs[0], slots[0]) = if blocks <= MAX_BLOCKS && leaf <= inner { (leaf, 0) } else { (inner, k) };
     for i in 2..WIDTH {
         let (cost, k) = share(i);
-        (choice.cost[i - 1], choice.left[i - 1]) =
-            if cost < choice.cost[i - 2] { (cost, k) } else { (choice.cost[i - 2], 0) };
+        (costs[i - 1], slots[i - 1]) = if cost < costs[i - 2] { (cost, k) } else { (costs[i - 2], 0) };
     }
-    node
+    (slots, costs)
 }
 
 /// Makes the wide tree from the binary one. The first node is the root; without triangles there is none.
-pub(crate) fn collapse(binary: &[Binary], items: &[Item], triangles: &[[Vec3; 3]]) -> (Vec<Node>, Vec<Block>) {
+pub(crate) fn collapse<C: Fn(usize) -> [Vec3; 3]>(
+    binary: &[Binary],
+    items: &[Item],
+    corners: &C,
+) -> (Vec<Node>, Vec<Block>) {
     let mut area = vec![0.0; items.len() + 1];
     for (i, item) in items.iter().enumerate() {
-        let [a, b, c] = triangles[item.triangle() as usize].map(|p| p.as_dvec3());
+        let [a, b, c] = corners(item.triangle() as usize).map(|p| p.as_dvec3());
         area[i + 1] = area[i] + (b - a).cross(c - a).length();
     }
-    let mut wide = Wide { binary, items, triangles, area, nodes: Vec::new(), blocks: Vec::new() };
+    let mut wide = Wide { binary, items, corners, area, nodes: Vec::new(), blocks: Vec::new() };
     if !binary.is_empty() {
         wide.nodes.push(Node::EMPTY);
-        if binary[0].choice.left[0] == 0 {
+        if binary[0].slots[0] == 0 {
             // A tree of one leaf still gets a node above it.
             wide.fill(0, &mut [(0, 0)]);
         } else {
@@ -86,26 +82,27 @@ pub(crate) fn collapse(binary: &[Binary], items: &[Item], triangles: &[[Vec3; 3]
     (wide.nodes, wide.blocks)
 }
 
-struct Wide<'a> {
+struct Wide<'a, C> {
     binary: &'a [Binary],
     items: &'a [Item],
-    triangles: &'a [[Vec3; 3]],
+    /// The corners of a triangle.
+    corners: &'a C,
     /// Twice the area of the first so many items.
     area: Vec<f64>,
     nodes: Vec<Node>,
     blocks: Vec<Block>,
 }
 
-impl Wide<'_> {
+impl<C: Fn(usize) -> [Vec3; 3]> Wide<'_, C> {
     /// Lists what hangs on the wide node above when the binary node at `at`, whose items start at `first`, is
     /// opened and may take `slots` places.
     fn open(&self, at: usize, first: usize, slots: usize, children: &mut Vec<(usize, usize)>) {
         let node = &self.binary[at];
         let left = node.left as usize;
-        let k = node.choice.left[if slots == WIDTH { 0 } else { slots - 1 }] as usize;
+        let k = node.slots[if slots == WIDTH { 0 } else { slots - 1 }] as usize;
         for (at, first, slots) in [(at + 1, first, k), (at + 2 * left, first + left, slots - k)] {
             // Where fewer slots cost as much, fewer are taken; with one left the subtree stays closed.
-            let slots = (2..=slots).rev().find(|&i| self.binary[at].choice.left[i - 1] != 0);
+            let slots = (2..=slots).rev().find(|&i| self.binary[at].slots[i - 1] != 0);
             match slots {
                 Some(slots) => self.open(at, first, slots, children),
                 None => children.push((at, first)),
@@ -125,7 +122,7 @@ impl Wide<'_> {
                 node.bounds[axis][slot] = binary.lo[axis];
                 node.bounds[axis + 3][slot] = binary.hi[axis];
             }
-            node.child[slot] = if binary.choice.left[0] == 0 {
+            node.child[slot] = if binary.slots[0] == 0 {
                 self.leaf(&self.items[first..first + binary.count as usize])
             } else {
                 self.nodes.push(Node::EMPTY);
@@ -154,7 +151,7 @@ impl Wide<'_> {
         for four in indices.chunks(LANES) {
             let mut block = Block::EMPTY;
             for (lane, &triangle) in four.iter().enumerate() {
-                block.set(lane, triangle, &self.triangles[triangle as usize]);
+                block.set(lane, triangle, &(self.corners)(triangle as usize));
             }
             self.blocks.push(block);
         }

@@ -9,6 +9,7 @@ use crate::sampling::{hash, unit};
 use crate::{Hit, Ray, Tree};
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{AlphaMode, Mesh, Scene, Side};
+use rayon::prelude::*;
 
 /// Hits are at an edge when they lie within so many offsets of it; distances of what meets there are told apart no better
 /// (backs are set back by two offsets).
@@ -81,11 +82,9 @@ impl<'a> Tracer<'a> {
         // Around the origin single precision is finest, so the tree lives in coordinates about the scene's centre.
         let centre = if mesh.vertices.is_empty() { DVec3::ZERO } else { 0.5 * (low + high) };
         let half = if mesh.vertices.is_empty() { 1.0 } else { (0.5 * (high - low)).max_element() };
-        let corners: Vec<[Vec3; 3]> =
-            (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| (p - centre).as_vec3())).collect();
         let kind: Vec<Kind> = mesh
             .source
-            .iter()
+            .par_iter()
             .map(|&source| {
                 let material = scene.material(source as usize);
                 let see_through = match material.alpha_mode {
@@ -102,7 +101,7 @@ impl<'a> Tracer<'a> {
         Tracer {
             scene,
             mesh,
-            tree: Tree::new(&corners),
+            tree: Tree::over(mesh.triangles.len(), |t| mesh.corners(t).map(|p| (p - centre).as_vec3())),
             centre,
             // Rounding a coordinate to single precision moves it by at most 2^-25 of its binade; interpolation and
             // the intersection test add about as much again. Eight times that clears the surface with certainty and
@@ -110,7 +109,7 @@ impl<'a> Tracer<'a> {
             offset: half * 2f64.powi(-21),
             all_opaque: kind.iter().all(|k| !k.see_through),
             kind,
-            normals: (0..mesh.triangles.len()).map(|t| mesh.normal(t).as_vec3()).collect(),
+            normals: (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t).as_vec3()).collect(),
         }
     }
 

@@ -8,7 +8,7 @@
 
 use crate::build::{Item, build};
 use crate::collapse::collapse;
-use crate::intersect::{Prepared, bounds_of, tie_of};
+use crate::intersect::{Prepared, tie_of};
 use crate::{Hit, Ray, portable};
 use glam::Vec3;
 
@@ -150,17 +150,22 @@ impl Tree {
     /// keep their indices; those with a corner that is not finite cannot be hit. Uses rayon's threads; the tree is the
     /// same for any number of them.
     pub fn new(triangles: &[[Vec3; 3]]) -> Tree {
-        let mut items: Vec<Item> = triangles
-            .iter()
-            .enumerate()
-            .filter(|(_, corners)| corners.iter().all(|c| c.is_finite()))
-            .map(|(i, corners)| Item::new(corners, i as u32))
-            .collect();
+        Tree::over(triangles.len(), |triangle| triangles[triangle])
+    }
+
+    /// The same over `len` triangles whose corners are worked out where they are asked for.
+    pub fn over(len: usize, corners: impl Fn(usize) -> [Vec3; 3] + Sync) -> Tree {
+        let item = |triangle: usize| {
+            let corners = corners(triangle);
+            corners.iter().all(|c| c.is_finite()).then(|| Item::new(&corners, triangle as u32))
+        };
+        let mut items: Vec<Item> = Vec::with_capacity(len);
+        items.extend((0..len).filter_map(item));
         let binary = build(&mut items);
-        let (nodes, blocks) = collapse(&binary, &items, triangles);
-        let bounds = bounds_of(triangles);
+        let (nodes, blocks) = collapse(&binary, &items, &corners);
+        let bounds = binary.first().map(|root| [root.lo, root.hi]);
         let tie = bounds.map_or(0.0, tie_of);
-        Tree { nodes, blocks, bounds, tie, len: triangles.len(), simd: has_simd() }
+        Tree { nodes, blocks, bounds, tie, len, simd: has_simd() }
     }
 
     /// The same tree for a part of a scene whose coordinates are at most `reach`: its hits compete with those of the tree of
