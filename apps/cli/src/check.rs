@@ -110,6 +110,6 @@ fn describe(input: &Input) -> Value {
     json!({
         "event": "result", "scene": input.title, "triangles": scene.triangles.len(), "area": area(input),
         "bounding_box": bounds, "objects": scene.objects.len(), "materials": materials, "lights": lights,
-        "cameras": cameras, "open_edges": faults::open_edges(&input.mesh), "faults": input.faults,
+        "cameras": cameras, "open_edges": faults::open_edges(&input.mesh.sides_of_edges()), "faults": input.faults,
     })
 }

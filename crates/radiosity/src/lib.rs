@@ -63,9 +63,9 @@ pub mod display {
     pub use radiosity_scene::lab::{delta_e, lab};
 }
 pub use radiosity_scene::{
-    AlphaMode, Bands, Camera, Elements, Enclosure, EnclosureSurface, Facet, Fault, Faults, Material, Mesh, Object,
-    PointLight, PointLightKind, Projection, Scene, Severity, Side, Sky, SkyPatches, Surface, Texture, TextureRef,
-    Transmission, Up, Wrap, counted, luminance, size,
+    AlphaMode, Bands, Camera, EdgeSide, Elements, Enclosure, EnclosureSurface, Facet, Fault, Faults, Material, Mesh,
+    Object, PointLight, PointLightKind, Projection, Scene, Severity, Side, Sky, SkyPatches, Surface, Texture,
+    TextureRef, Transmission, Up, Wrap, counted, luminance, size,
 };
 pub use radiosity_solve as solve;
 pub use radiosity_trace::{Found, Place, Tracer};

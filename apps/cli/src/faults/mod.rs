@@ -4,8 +4,7 @@ mod flipped;
 mod overlap;
 pub mod sheets;
 
-use radiosity::{Faults, Mesh, PointLight, Scene, counted};
-use std::collections::HashMap;
+use radiosity::{EdgeSide, Faults, Mesh, PointLight, Scene, counted};
 
 /// Adds the faults of a scene that can be read; `title` is what the scene is called.
 pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
@@ -14,7 +13,8 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
             "give it a sky, --sky overcast:10000, faces an emissive material, or lamps, KHR_lights_punctual in glTF";
         faults.warning(title, "there is no light, and all will be black", hint);
     }
-    let open = open_edges(mesh);
+    let sides = mesh.sides_of_edges();
+    let open = open_edges(&sides);
     if open > 0 {
         faults.note(
             title,
@@ -23,7 +23,7 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
         );
     }
     let place = |object: usize| format!("{title}: object '{}'", scene.objects[object].name);
-    for (object, count) in flipped::edges(scene, mesh) {
+    for (object, count) in flipped::edges(scene, mesh, &sides) {
         let edges = counted(count, "edge lies", "edges lie");
         faults.warning(
             place(object),
@@ -31,6 +31,7 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
             "turn the faces that look the wrong way ('recalculate normals'), or make the material two-sided",
         );
     }
+    drop(sides);
     if mesh.uncut {
         faults.warning(
             title,
@@ -61,14 +62,7 @@ fn is_dark(scene: &Scene) -> bool {
     scene.sky.is_black() && !scene.lights.iter().any(is_lamp) && !(0..scene.triangles.len()).any(shines)
 }
 
-/// Edges of the welded mesh that only one face has.
-pub fn open_edges(mesh: &Mesh) -> usize {
-    let mut walked: HashMap<(u32, u32), u32> = HashMap::new();
-    for corners in &mesh.triangles {
-        for i in 0..3 {
-            let (a, b) = (corners[i], corners[(i + 1) % 3]);
-            *walked.entry((a.min(b), a.max(b))).or_default() += 1;
-        }
-    }
-    walked.values().filter(|n| **n == 1).count()
+/// Edges of the welded mesh that only one face has, from the sides of all.
+pub fn open_edges(sides: &[EdgeSide]) -> usize {
+    sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| faces.len() == 1).count()
 }

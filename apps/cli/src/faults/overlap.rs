@@ -7,6 +7,7 @@
 //! one cell are compared. That is linear for the triangles of any sane model and bounded for all others.
 
 use radiosity::{Mesh, Scene};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
 /// Steps of normals and of distances (in extents of the scene) by which triangles are sorted into planes. Triangles of
@@ -36,22 +37,28 @@ pub fn search(scene: &Scene, mesh: &Mesh) -> Overlaps {
     let object = |t: usize| scene.triangle_object[mesh.source[t] as usize] as usize;
 
     // Sort by plane. Each triangle goes into two neighbouring steps of distance, so that no border parts a plane.
-    let mut planes: BTreeMap<[i64; 4], Vec<usize>> = BTreeMap::new();
-    for t in 0..mesh.triangles.len() {
+    let plane = |t: usize| {
         // Both sides of a plane under one key.
         let (normal, [a, ..]) = (mesh.normal(t), mesh.corners(t));
         let rounded = (normal / STEPS[0]).round().as_i64vec3().to_array();
         let sign = rounded.iter().map(|x| x.signum()).find(|sign| *sign != 0).unwrap_or(1);
-        let [x, y, z] = rounded.map(|x| sign * x);
         let distance = (sign as f64 * normal.dot(a - centre) / step).floor() as i64;
-        planes.entry([x, y, z, distance]).or_default().push(t);
-        planes.entry([x, y, z, distance + 1]).or_default().push(t);
-    }
+        (rounded.map(|x| (sign * x) as i8), distance as i16)
+    };
+    let mut planes: Vec<([i8; 3], i16, u32)> = (0..mesh.triangles.len())
+        .into_par_iter()
+        .flat_map_iter(|t| {
+            let (normal, distance) = plane(t);
+            [distance, distance + 1].map(|distance| (normal, distance, t as u32))
+        })
+        .collect();
+    planes.par_sort_unstable();
 
     let mut lies_on: Vec<Option<usize>> = vec![None; mesh.triangles.len()];
     let mut covered = vec![false; mesh.triangles.len()];
     let mut effort = EFFORT.saturating_mul(mesh.triangles.len()).max(1_000_000);
-    for triangles in planes.values() {
+    for plane in planes.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let triangles: Vec<usize> = plane.iter().map(|(_, _, t)| *t as usize).collect();
         if triangles.iter().all(|&t| object(t) == object(triangles[0])) {
             continue;
         }
