@@ -24,6 +24,9 @@ const RATIO: u32 = 4;
 /// The streams of sample points that direct light uses: one for places, then one for each light.
 const DIRECT: u32 = 0x0300;
 
+/// Receivers that one thread takes at a time.
+const CHUNK: usize = 64;
+
 /// How many shadow rays to spend.
 #[derive(Clone, Copy, Debug)]
 pub struct Shadowing {
@@ -117,63 +120,110 @@ impl Luminaires {
         shadowing: &Shadowing,
         progress: &impl Progress,
     ) -> Result<Columns, Stopped> {
+        let (columns, reached) = self.columns_so_far(tracer, receivers, shadowing, |chunk| chunk as u32, progress);
+        reached.iter().all(|reached| *reached).then_some(columns).ok_or(Stopped)
+    }
+
+    /// The same until `progress` stops it. Receivers are taken in no order, so that those that were reached lie all over the
+    /// scene; the others get the mean of these by `weight`, none where none was reached.
+    pub fn columns_in_time(
+        &self,
+        tracer: &Tracer,
+        receivers: &impl Receivers,
+        shadowing: &Shadowing,
+        weight: &[f64],
+        progress: &impl Progress,
+    ) -> Columns {
+        let (mut columns, reached) =
+            self.columns_so_far(tracer, receivers, shadowing, |chunk| hash(chunk as u32), progress);
+        let kept = columns.lights;
+        let is_reached = |i: &usize| reached[i / CHUNK];
+        let mut sums = vec![[0f64; 3]; kept + 1];
+        let mut total = 0.0;
+        for i in (0..receivers.len()).filter(is_reached) {
+            total += weight[i];
+            for (sum, e) in sums.iter_mut().zip(columns.seen_by_light(i).iter().chain([&columns.mean[i]])) {
+                (0..3).for_each(|band| sum[band] += weight[i] * f64::from(e[band]));
+            }
+        }
+        let means: Vec<Bands> =
+            sums.into_iter().map(|sum| sum.map(|sum| (sum / f64::max(total, f64::MIN_POSITIVE)) as f32)).collect();
+        for i in (0..receivers.len()).filter(|i| !is_reached(i)) {
+            columns.seen[i * kept..][..kept].copy_from_slice(&means[..kept]);
+            columns.mean[i] = means[kept];
+            columns.shaded[i] = true;
+        }
+        columns
+    }
+
+    /// What comes of it until `progress` stops it, and which chunks of receivers that is; they are taken in the order of a key.
+    fn columns_so_far(
+        &self,
+        tracer: &Tracer,
+        receivers: &impl Receivers,
+        shadowing: &Shadowing,
+        key: impl Fn(usize) -> u32,
+        progress: &impl Progress,
+    ) -> (Columns, Vec<bool>) {
         let (n, lights) = (receivers.len(), self.lights.len());
         // Points are not looked up by others.
         let kept = if n > 0 && receivers.near(0).is_some() { lights } else { 0 };
         let mut columns =
             Columns { lights: kept, seen: vec![[0.0; 3]; n * kept], mean: vec![[0.0; 3]; n], shaded: vec![false; n] };
+        let mut reached = vec![lights == 0; n.div_ceil(CHUNK)];
         if lights == 0 {
-            return Ok(columns);
+            return (columns, reached);
         }
-        const CHUNK: usize = 64;
         let done = AtomicUsize::new(0);
         let mut seen: Vec<&mut [Bands]> = columns.seen.chunks_mut(CHUNK * kept.max(1)).collect();
         seen.resize_with(n.div_ceil(CHUNK), Default::default);
-        let chunks = seen.into_par_iter().zip(columns.mean.par_chunks_mut(CHUNK));
-        chunks.zip(columns.shaded.par_chunks_mut(CHUNK)).enumerate().try_for_each(
-            |(chunk, ((seen, mean), shaded))| {
-                let mut scratch = self.scratch(RATIO);
-                let mut at: Vec<Place> = Vec::new();
-                let mut lit: Vec<[f64; 3]> = Vec::new();
-                for (k, mean) in mean.iter_mut().enumerate() {
-                    let i = chunk * CHUNK + k;
-                    at.clear();
-                    lit.clear();
-                    self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |_, place, visible| {
-                        at.push(*place);
-                        lit.extend_from_slice(visible);
-                    });
-                    shaded[k] = scratch.outcomes & !CHANCE != LIT;
-                    // Where all is lit or all is dark, what is seen from afar has the light of the whole.
-                    let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
-                    let near = receivers.near(i).filter(|_| mixed || scratch.most_parts > shadowing.rays as usize);
-                    let open: Vec<f64> = match near {
-                        Some(near) => openness(tracer, &at, near, receivers.seed(i)),
-                        None => vec![1.0; at.len()],
-                    };
-                    let (places, all_open) = (at.len() as f64, open.iter().sum::<f64>());
-                    for l in 0..lights {
-                        let mut sums = [0f64; 6];
-                        for (visible, open) in lit.chunks_exact(lights).zip(&open) {
-                            for band in 0..3 {
-                                sums[band] += visible[l][band];
-                                sums[band + 3] += open * visible[l][band];
-                            }
-                        }
+        let chunks = seen.into_iter().zip(columns.mean.chunks_mut(CHUNK)).zip(columns.shaded.chunks_mut(CHUNK));
+        let mut chunks: Vec<_> = chunks.zip(&mut reached).enumerate().collect();
+        chunks.sort_by_key(|(chunk, _)| key(*chunk));
+        // Whoever stops it is not asked again; what is under way is brought to its end.
+        let _ = chunks.into_par_iter().try_for_each(|(chunk, (((seen, mean), shaded), reached))| {
+            let mut scratch = self.scratch(RATIO);
+            let mut at: Vec<Place> = Vec::new();
+            let mut lit: Vec<[f64; 3]> = Vec::new();
+            for (k, mean) in mean.iter_mut().enumerate() {
+                let i = chunk * CHUNK + k;
+                at.clear();
+                lit.clear();
+                self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |_, place, visible| {
+                    at.push(*place);
+                    lit.extend_from_slice(visible);
+                });
+                shaded[k] = scratch.outcomes & !CHANCE != LIT;
+                // Where all is lit or all is dark, what is seen from afar has the light of the whole.
+                let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
+                let near = receivers.near(i).filter(|_| mixed || scratch.most_parts > shadowing.rays as usize);
+                let open: Vec<f64> = match near {
+                    Some(near) => openness(tracer, &at, near, receivers.seed(i)),
+                    None => vec![1.0; at.len()],
+                };
+                let (places, all_open) = (at.len() as f64, open.iter().sum::<f64>());
+                for l in 0..lights {
+                    let mut sums = [0f64; 6];
+                    for (visible, open) in lit.chunks_exact(lights).zip(&open) {
                         for band in 0..3 {
-                            let over_area = sums[band] / f64::max(places, 1.0);
-                            mean[band] += over_area as f32;
-                            if let Some(seen) = seen.get_mut(k * kept + l) {
-                                seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
-                            }
+                            sums[band] += visible[l][band];
+                            sums[band + 3] += open * visible[l][band];
+                        }
+                    }
+                    for band in 0..3 {
+                        let over_area = sums[band] / f64::max(places, 1.0);
+                        mean[band] += over_area as f32;
+                        if let Some(seen) = seen.get_mut(k * kept + l) {
+                            seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
                         }
                     }
                 }
-                let so_far = done.fetch_add(mean.len(), Ordering::Relaxed) + mean.len();
-                progress.step(so_far, n).then_some(()).ok_or(Stopped)
-            },
-        )?;
-        Ok(columns)
+            }
+            *reached = true;
+            let so_far = done.fetch_add(mean.len(), Ordering::Relaxed) + mean.len();
+            progress.step(so_far, n).then_some(()).ok_or(Stopped)
+        });
+        (columns, reached)
     }
 
     /// Mean and variance of the direct illuminance over each receiver. The variance is that over places, without that
@@ -193,7 +243,6 @@ impl Luminaires {
         if self.lights.is_empty() {
             return Ok(variation);
         }
-        const CHUNK: usize = 64;
         let done = AtomicUsize::new(0);
         variation.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, out)| {
             let mut scratch = self.scratch(1);
@@ -420,6 +469,42 @@ mod tests {
                 })
                 .sum();
             assert!((e - truth).abs() < 1e-5 * truth, "{e} for {truth}");
+        }
+    }
+
+    /// What is reached before time is over has the light that it has without a limit, to the bit; the rest has the mean of it.
+    #[test]
+    fn what_time_does_not_reach_has_the_mean() {
+        struct After(usize);
+        impl Progress for After {
+            fn step(&self, done: usize, _total: usize) -> bool {
+                done < self.0
+            }
+        }
+        let scene = lamps(1, true);
+        let mesh = Mesh::new(&scene);
+        let elements = Elements::new(&scene, &mesh, 0.1);
+        let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+        let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(&scene, &mesh, e).1).collect();
+        let luminaires = Luminaires::new(&scene, &mesh, &elements, &area, &exitance);
+        let (tracer, exposure) = (Tracer::new(&scene, &mesh), crate::Exposure::default());
+        let receivers = crate::ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+        let shadowing = Shadowing { places: 2, rays: 2 };
+        let whole = luminaires.columns(&tracer, &receivers, &shadowing, &()).unwrap();
+        let n = elements.len();
+        assert!(luminaires.columns(&tracer, &receivers, &shadowing, &After(n / 2)).is_err());
+        for after in [0, n / 2, n + 1] {
+            let found = luminaires.columns_in_time(&tracer, &receivers, &shadowing, &area, &After(after));
+            let is_same = |i: &usize| found.mean(*i) == whole.mean(*i) && found.seen(*i) == whole.seen(*i);
+            let (same, other): (Vec<usize>, Vec<usize>) = (0..n).partition(is_same);
+            // A little more than asked for: what is under way is brought to its end, on as many threads as there are.
+            assert!(same.len() >= after.min(n) && (after > n || other.len() > n / 4), "{} of {n}", same.len());
+            for band in 0..3 {
+                let of = |i: &usize| area[*i] * f64::from(found.mean(*i)[band]);
+                let mean = same.iter().map(of).sum::<f64>() / same.iter().map(|i| area[*i]).sum::<f64>();
+                let is_mean = |i: &usize| (f64::from(found.mean(*i)[band]) - mean).abs() < 1e-2 * mean;
+                assert!(other.iter().all(is_mean), "{mean}");
+            }
         }
     }
 
