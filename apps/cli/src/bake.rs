@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         frames::prepare(folder)?;
     }
     progress.part("reading");
-    let mut input = input::load(&arguments.scene, global, progress)?;
+    let mut input = input::load(&arguments.scene, arguments.solve.memory, global, progress)?;
     if let Some(fault) = faults::sheets::warning(&input.scene, &input.title) {
         progress.say(&fault.to_string());
         input.faults.0.push(fault);

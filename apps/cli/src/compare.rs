@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.promise(path, &["html", "json"])?;
     }
     progress.part("reading");
-    let input = input::load(&arguments.scene, global, progress)?;
+    let input = input::load(&arguments.scene, arguments.memory, global, progress)?;
     outputs.spare(&input.files)?;
     let tracer = Tracer::new(&input.scene, &input.mesh);
     progress.parts();

@@ -6,7 +6,7 @@ use clap::Args;
 use radiosity::io::{Document, LoadOptions};
 use radiosity::solve::Solver;
 use radiosity::transport::{FormFactorMethod, HitTable};
-use radiosity::{Displayed, Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up, size};
+use radiosity::{Displayed, Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up, counted, least_memory, size};
 use std::f64::consts::SQRT_2;
 use std::path::{Path, PathBuf};
 
@@ -69,7 +69,8 @@ pub struct SolveArguments {
     /// Width of an element in metres, instead of letting the program choose.
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     pub element_size: Option<f64>,
-    /// Memory for the table of hit ids, e.g. 4G or 500M, also written 4GiB or 500MB; powers of 1024.
+    /// Memory for the scene and all that is worked out, e.g. 4G or 500M, also written 4GiB or 500MB; powers of 1024. What does not
+    /// fit is told before it is taken.
     #[arg(long, default_value = "4G", value_name = "BYTES", allow_hyphen_values = true, value_parser = numbers::bytes)]
     pub memory: usize,
     /// How light between elements is found: rays, the default, or one of adaptive, hemicube, hemicube-midpoint, single-plane,
@@ -268,9 +269,20 @@ pub struct Input {
     pub title: String,
 }
 
-/// Reads the scene and its sky; all faults at once.
-pub fn load(arguments: &SceneArguments, global: &Global, progress: &Progress) -> Result<Input, Failure> {
-    let input = read(arguments)?;
+/// Reads the scene and its sky; all faults at once. What cannot be solved within some bytes is not welded.
+pub fn load(arguments: &SceneArguments, memory: usize, global: &Global, progress: &Progress) -> Result<Input, Failure> {
+    let parsed = parse(arguments)?;
+    let (triangles, least) = (parsed.scene.triangles.len(), least_memory(&parsed.scene));
+    if least > memory {
+        return Err(Failure::input(format!(
+            "{}: {} need {} MB at least, to be welded, seen by rays and solved; {} are allowed (allow more by --memory)",
+            parsed.title,
+            counted(triangles, "triangle", "triangles"),
+            least.div_ceil(1 << 20),
+            size(memory)
+        )));
+    }
+    let input = parsed.examined();
     input.tell_faults(global, progress);
     Ok(input)
 }

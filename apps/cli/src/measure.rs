@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     progress.part("reading");
     let read = radiosity::io::read_points_csv(&arguments.points)?;
     let points = &read.points;
-    let input = input::load(&arguments.scene, global, progress)?;
+    let input = input::load(&arguments.scene, arguments.solve.memory, global, progress)?;
     outputs.spare(&input.files)?;
     arguments.solve.refuse_tiny_elements(&input.mesh)?;
     let tracer = Tracer::new(&input.scene, &input.mesh);

@@ -32,7 +32,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         frames::prepare(folder)?;
     }
     progress.part("reading");
-    let input = input::load(&arguments.scene, global, progress)?;
+    let input = input::load(&arguments.scene, arguments.solve.memory, global, progress)?;
     outputs.spare(&input.files)?;
     arguments.solve.refuse_tiny_elements(&input.mesh)?;
     let tracer = Tracer::new(&input.scene, &input.mesh);

@@ -143,19 +143,19 @@ impl Receivers for Cells<'_> {
 /// [`Stopped`] if `progress` says so.
 pub(crate) fn divided(
     tracer: &Tracer,
-    cells: Elements,
+    cells: &Elements,
     variation: f64,
     progress: &impl Progress,
 ) -> Result<Elements, Stopped> {
     // Nothing is asked of light that may vary as it likes, and looking takes seconds in a furnished room.
     if variation == f64::INFINITY {
-        return Ok(cells);
+        return Ok(cells.clone());
     }
-    let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &cells);
-    let luminaires = Luminaires::new(tracer.scene, tracer.mesh, &cells, &area, &exitance);
+    let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, cells);
+    let luminaires = Luminaires::new(tracer.scene, tracer.mesh, cells, &area, &exitance);
     // Nothing is known yet of what is buried; such places drop out one by one.
     let exposure = Exposure::default();
-    let receivers = Cells(ElementReceivers { mesh: tracer.mesh, elements: &cells, exposure: &exposure });
+    let receivers = Cells(ElementReceivers { mesh: tracer.mesh, elements: cells, exposure: &exposure });
     // A light of many parts is as many lights.
     let parts = |light: &Light| if matches!(light, Light::Area { tree: Some(_), .. }) { RAYS } else { 1 };
     let parts: usize = luminaires.lights.iter().map(parts).sum();

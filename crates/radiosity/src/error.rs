@@ -41,8 +41,9 @@ pub enum Error {
     Time(&'static str),
     /// The memory that was allowed does not suffice.
     #[error(
-        "{elements} elements with {rays} rays each need {}; {} allowed (use larger elements or allow more)",
-        size(*needed), are(*allowed)
+        "{elements} elements with {rays} rays each, and the scene, need {}; {} allowed (use larger elements or allow more; {} MB would \
+         be the least)",
+        size(*needed), are(*allowed), least.div_ceil(1 << 20)
     )]
     Memory {
         /// Elements asked for.
@@ -53,6 +54,8 @@ pub enum Error {
         needed: usize,
         /// Bytes allowed.
         allowed: usize,
+        /// Bytes that the scene needs with the largest elements and the fewest rays.
+        least: usize,
     },
     /// The memory that was allowed does not hold form factors between all elements.
     #[error(

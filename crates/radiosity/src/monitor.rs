@@ -23,9 +23,10 @@ pub trait Monitor: Sync {
     /// A whole solution is there: the first before any row is traced, then after each solve.
     fn solved(&self, _solution: &Solution) {}
     /// When the answer so far will do; none for never. What is asked for then ends with what it has by that time: a whole
-    /// answer, with its error. It ends a little later, as it takes the first few rays of each element, the least that an audit
-    /// needs, and the writing, however late that is. How far it comes depends on the machine, and so do its bytes; all
-    /// else does not.
+    /// answer, with its error. It ends a little later, as it takes the least that an audit needs, the writing and, where there
+    /// are no more than a hundred thousand elements, the first few rays of each, however late that is. Of more elements those
+    /// that were not reached have the mean of the others' direct light, and without rays all have the ambient term
+    /// ([`Solution::begin`]). How far it comes depends on the machine, and so do its bytes; all else does not.
     fn deadline(&self) -> Option<Instant> {
         None
     }
@@ -58,6 +59,18 @@ pub(crate) struct Hurry<'a>(pub &'a dyn Monitor);
 impl Progress for Hurry<'_> {
     fn step(&self, done: usize, total: usize) -> bool {
         self.0.step(done, total) && !is_over(self.0)
+    }
+}
+
+/// Hands a monitor to what is brought to its end where that is soon, and may else be left undone when its time is over.
+pub(crate) struct Begin<'a> {
+    pub monitor: &'a dyn Monitor,
+    pub is_soon: bool,
+}
+
+impl Progress for Begin<'_> {
+    fn step(&self, done: usize, total: usize) -> bool {
+        self.monitor.step(done, total) && (self.is_soon || !is_over(self.monitor))
     }
 }
 

@@ -129,6 +129,15 @@ impl Mesh {
         (suspects.into_iter().filter(vanishes).map(|t| t as u32).collect(), tolerance)
     }
 
+    /// Memory that it takes, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.vertices)
+            + size_of_val(&*self.triangles)
+            + size_of_val(&*self.source)
+            + size_of_val(&*self.split)
+            + size_of_val(&*self.smooth)
+    }
+
     /// Corner positions of a triangle.
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|v| self.vertices[v as usize])

@@ -126,6 +126,20 @@ impl Scene {
         &self.materials[self.objects[self.triangle_object[triangle] as usize].material]
     }
 
+    /// Memory that its surfaces and pictures take, bytes.
+    pub fn bytes(&self) -> usize {
+        let of_vertices = size_of_val(&*self.positions)
+            + size_of_val(&*self.normals)
+            + self.uvs.iter().map(|set| size_of_val(&**set)).sum::<usize>()
+            + size_of_val(&*self.colors);
+        let of_triangles =
+            size_of_val(&*self.triangles) + size_of_val(&*self.triangle_object) + size_of_val(&*self.triangle_source);
+        of_vertices
+            + of_triangles
+            + size_of_val(&*self.objects)
+            + self.textures.iter().map(|texture| size_of_val(&*texture.texels)).sum::<usize>()
+    }
+
     /// Smallest box around all positions; `None` without any.
     pub fn bounding_box(&self) -> Option<[DVec3; 2]> {
         let first = *self.positions.first()?;

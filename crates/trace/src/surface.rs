@@ -113,6 +113,11 @@ impl<'a> Tracer<'a> {
         }
     }
 
+    /// Memory that it takes beside the scene and the mesh, bytes.
+    pub fn bytes(&self) -> usize {
+        self.tree.memory() + size_of_val(&*self.kind) + size_of_val(&*self.normals)
+    }
+
     /// The tree of boxes (its coordinates are relative to the scene's centre).
     pub fn tree(&self) -> &Tree {
         &self.tree

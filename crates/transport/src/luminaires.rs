@@ -144,6 +144,12 @@ impl Luminaires {
         Luminaires { lights, promoted, carried }
     }
 
+    /// Lights that a scene has at most, told by its objects alone.
+    pub fn most(scene: &Scene) -> usize {
+        let shining = scene.objects.iter().filter(|object| scene.materials[object.material].emits()).count();
+        scene.lights.len() + shining.min(MOST_LAMPS)
+    }
+
     /// Whether all emission of a triangle's side reaches receivers through the lights. Its elements may still be dark
     /// in [`Luminaires::promoted`], where their few samples miss what is bright in a picture.
     pub fn carries(&self, triangle: usize, side: Side) -> bool {

@@ -74,7 +74,10 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("render -o a.png --eye -1,2,3 --target -1,2,3", "the same place"),
         ("render -o a.png --eye 1,2,3 --target 0,0,0 --camera front", "cannot be used with"),
         ("render -o a.png --eye 1,2,3 --target 0,0,0 --fov 200", "degrees from 1 to 170"),
-        ("bake --memory 1K", "1.0 KB are allowed (use larger elements or allow more"),
+        (
+            "bake --memory 1K",
+            "1 MB at least, to be welded, seen by rays and solved; 1.0 KB are allowed (allow more by --memory)",
+        ),
         (
             "bake --solver lu --element-size 0.003",
             "TB; 4.0 GB are allowed (use a larger --element-size, an iterative --solver",

@@ -215,7 +215,8 @@ impl Session {
         let most = Target { rays, shadows: shadows.max(1).next_power_of_two().min(MOST_SHADOWS) };
         let (needed, allowed) = (bytes(elements, rays, lights.min(MOST_COLUMNS)), options.memory);
         if needed > allowed {
-            return Err(Error::Memory { elements, rays: rays as usize, needed, allowed });
+            let least = bytes(Live::count(&scene, f64::INFINITY), 4, lights.min(MOST_COLUMNS));
+            return Err(Error::Memory { elements, rays: rays as usize, needed, allowed, least });
         }
 
         let live = Live::new(Arc::new(scene), size, most);

@@ -8,20 +8,25 @@ mod options;
 
 pub use balance::Balance;
 pub use options::SolveOptions;
-pub(crate) use options::element_size;
+pub(crate) use options::{LEAST_RAYS, element_size};
 
 use crate::Error;
 use crate::displayed::{Screen, Shown};
 use crate::division::{Optics, Sheets, divided};
 use crate::equation::{self, Matrix, Task, single};
-use crate::monitor::{Hurry, Monitor, Stages, Watch, is_over};
+use crate::footprint::{self, least_memory};
+use crate::monitor::{Begin, Hurry, Monitor, Stages, Watch, is_over};
 use radiosity_scene::{Bands, Elements, SkyPatches};
 use radiosity_solve::{DiffuseResponse, Info};
 use radiosity_trace::Tracer;
 use radiosity_transport::{Columns, ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires};
 
-/// Rays per cell that are traced whether or not there is time: a tenth of a second for a room.
+/// Rays per cell that are traced whether or not there is time, where elements are [`FEW`]: a tenth of a second for a room.
 const FIRST_RAYS: usize = 16;
+
+/// So many elements get their direct light and their first rays whether or not there is time: a few seconds. A building of a
+/// million triangles took 102 s where 60 were allowed.
+const FEW: usize = 100_000;
 
 /// A solved scene.
 pub struct Solution<'a> {
@@ -93,28 +98,45 @@ impl<'a> Solution<'a> {
         options.refuse_large_matrices(Elements::count(scene, mesh, element_size))?;
         let needed = Solution::memory(tracer, options);
         if needed > options.memory {
-            return Err(memory_error(Elements::count(scene, mesh, element_size), needed, options));
+            return Err(memory_error(tracer, Elements::count(scene, mesh, element_size), needed, options));
         }
-        let watch = Watch(monitor);
+        let needed = |elements: &Elements| {
+            footprint::solution(tracer, (elements.len(), elements.cells()), options.rays, Luminaires::most(scene))
+        };
+        let begin = |elements: usize| Begin { monitor, is_soon: elements <= FEW };
         let elements = stages.time(monitor, "elements", || {
             let cells = Elements::new(scene, mesh, element_size);
             let cells = if options.looked_up { cells.shared(element_size) } else { cells };
-            divided(tracer, cells, options.variation, &watch)
+            match divided(tracer, &cells, options.variation, &begin(cells.len())) {
+                Err(_) if is_over(monitor) => Ok(cells),
+                // Coarser light, where there is no room for finer.
+                Ok(fine) if needed(&fine) > options.memory && needed(&cells) <= options.memory => Ok(cells),
+                done => done,
+            }
         })?;
         options.refuse_large_matrices(elements.len())?;
         let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
-        let exposure = stages.time(monitor, "exposure", || Exposure::new(tracer, mesh, &elements, &watch))?;
+        let begin = begin(elements.len());
+        let exposure = stages.time(monitor, "exposure", || match Exposure::new(tracer, mesh, &elements, &begin) {
+            // Buried places are rejected one by one then.
+            Err(_) if is_over(monitor) => Ok(Exposure::default()),
+            done => done,
+        })?;
         let sheets = sheets.exposed(&exposure);
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
-        let needed = needed + elements.len() * luminaires.lights.len() * size_of::<Bands>();
+        let needed = needed(&elements);
         if needed > options.memory {
-            return Err(memory_error(elements.len(), needed, options));
+            return Err(memory_error(tracer, elements.len(), needed, options));
         }
         let sky = SkyPatches::new(&scene.sky, scene.up.direction());
 
         let receivers = ElementReceivers { mesh, elements: &elements, exposure: &exposure };
-        let columns = stages
-            .time(monitor, "direct light", || luminaires.columns(tracer, &receivers, &options.shadowing, &watch))?;
+        let columns = stages.time(monitor, "direct light", || {
+            if monitor.deadline().is_some() {
+                return Ok(luminaires.columns_in_time(tracer, &receivers, &options.shadowing, &area, &begin));
+            }
+            luminaires.columns(tracer, &receivers, &options.shadowing, &begin)
+        })?;
 
         let id_space = IdSpace { elements: &elements, sky };
         let table = HitTable::new(area.clone(), &id_space);
@@ -186,15 +208,22 @@ impl<'a> Solution<'a> {
         }
     }
 
-    /// Bytes that may be taken for what grows with the accuracy.
+    /// Bytes that may be taken beside the solution and what it is made of.
     pub fn memory_allowed(&self) -> usize {
-        self.options.memory
+        self.options.memory.saturating_sub(self.needed(self.rays()))
     }
 
-    /// Bytes that the table of hit ids takes with these options.
+    /// Bytes of the solution with so many rays, and of what it is made of.
+    fn needed(&self, rays: usize) -> usize {
+        let counts = (self.elements.len(), self.elements.cells());
+        footprint::solution(self.tracer, counts, rays, Luminaires::most(self.tracer.scene))
+    }
+
+    /// Bytes that the scene, its mesh and tree and a solution with these options take, as far as that is known before the
+    /// elements are made: none of them divided, without what each light gives to each.
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
-        let (scene, mesh) = (tracer.scene, tracer.mesh);
-        HitTable::bytes(Elements::count(scene, mesh, element_size(tracer, options)), options.rays)
+        let cells = Elements::count(tracer.scene, tracer.mesh, element_size(tracer, options));
+        footprint::solution(tracer, (cells, cells), options.rays, 0)
     }
 
     /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
@@ -226,9 +255,10 @@ impl<'a> Solution<'a> {
     /// # Errors
     /// As [`Solution::new`]; [`Error::Displayed`], [`Error::Tolerance`], [`Error::Time`].
     pub fn refine(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
-        let needed = HitTable::bytes(self.elements.cells(), rays);
+        let needed = self.needed(rays);
         if needed > self.options.memory {
-            return Err(memory_error(self.elements.cells(), needed, &SolveOptions { rays, ..self.options }));
+            let options = SolveOptions { rays, ..self.options };
+            return Err(memory_error(self.tracer, self.elements.len(), needed, &options));
         }
         self.trace(rays, monitor)?;
         if let (Some(method), None) = (self.options.form_factors, &self.matrix) {
@@ -241,6 +271,9 @@ impl<'a> Solution<'a> {
                 other => other,
             })?);
         }
+        if self.is_ambient() {
+            return Ok(());
+        }
         let started = std::time::Instant::now();
         monitor.stage("solve");
         self.solve(monitor)?;
@@ -249,8 +282,13 @@ impl<'a> Solution<'a> {
         Ok(())
     }
 
+    /// Whether indirect light is the ambient term still.
+    fn is_ambient(&self) -> bool {
+        self.table.columns() == 0 && self.matrix.is_none()
+    }
+
     /// Appends rays up to `rays` per cell. Where there is a time limit they come in portions, each as many as there are, and
-    /// those that it does not leave time for are not there; sixteen always are.
+    /// those that it does not leave time for are not there; where elements are few, sixteen always are.
     fn trace(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
         let ids = IdSpace { elements: &self.elements, sky: self.sky };
         let mesh = self.tracer.mesh;
@@ -263,7 +301,11 @@ impl<'a> Solution<'a> {
                 return Ok(table.extend(tracer, (&ids, &sky), &receivers, rays, &Watch(monitor))?);
             }
             if table.columns() == 0 {
-                table.extend(tracer, (&ids, &sky), &receivers, FIRST_RAYS.min(rays), &Watch(monitor))?;
+                let begin = Begin { monitor, is_soon: receivers.elements.len() <= FEW };
+                match table.extend(tracer, (&ids, &sky), &receivers, FIRST_RAYS.min(rays), &begin) {
+                    Err(_) if is_over(monitor) => return Ok(()),
+                    done => done?,
+                }
             }
             while table.columns() < rays && !is_over(monitor) {
                 let next = (2 * table.columns()).min(rays);
@@ -387,6 +429,9 @@ impl<'a> Solution<'a> {
 
     /// The same as the two halves of its rays tell it.
     pub(crate) fn indirect_halves(&self) -> Vec<[Bands; 2]> {
+        if self.is_ambient() {
+            return self.indirect.iter().map(|h| [*h; 2]).collect();
+        }
         let both = |(daylight, of_elements): (&[Bands; 2], [[f32; 4]; 2])| {
             std::array::from_fn(|k| std::array::from_fn(|band| (daylight[k][band] + of_elements[k][band]).max(0.0)))
         };
@@ -445,6 +490,7 @@ impl<'a> Solution<'a> {
 }
 
 /// What an answer would need that the options do not allow.
-fn memory_error(elements: usize, needed: usize, options: &SolveOptions) -> Error {
-    Error::Memory { elements, rays: options.rays, needed, allowed: options.memory }
+fn memory_error(tracer: &Tracer, elements: usize, needed: usize, options: &SolveOptions) -> Error {
+    let least = least_memory(tracer.scene);
+    Error::Memory { elements, rays: options.rays, needed, allowed: options.memory, least }
 }

@@ -38,7 +38,7 @@ pub struct SolveOptions {
     pub params: Params,
     /// Stops when what is displayed is near enough, whatever the residual.
     pub displayed: Option<Displayed>,
-    /// Largest size of the table of hit ids, bytes.
+    /// Memory that the scene, its mesh and tree, the solution and what is written of it may take, bytes.
     pub memory: usize,
 }
 
@@ -61,7 +61,7 @@ impl Default for SolveOptions {
 }
 
 /// Rays per cell below which an answer is of no use.
-const LEAST_RAYS: usize = 32;
+pub(crate) const LEAST_RAYS: usize = 32;
 
 /// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
 const MATRIX_CELLS: usize = 2000;

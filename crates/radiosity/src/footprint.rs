@@ -1,0 +1,96 @@
+//! Memory, told before it is taken: what a scene holds, what making its mesh and its tree takes on the way, and what a solution takes.
+//!
+//! Bytes are counted or, where they depend on more than counts, the most that was measured: a building and a soup of a million and
+//! of ten million triangles took 110 to 270 bytes a triangle to weld and 200 for the tree (peak of the process less what it held).
+
+use crate::solution::LEAST_RAYS;
+use radiosity_scene::{Bands, Scene};
+use radiosity_trace::Tracer;
+use radiosity_transport::Luminaires;
+
+/// Most bytes a triangle while it is welded: four fifths of them contacts, in a scene in which all goes through all.
+const WELDING: usize = 300;
+
+/// Most bytes a triangle while the tree is built.
+const BUILDING: usize = 220;
+
+/// Bytes that a welded triangle holds, its vertices apart, and one in the tree.
+const WELDED: usize = 28;
+const IN_TREE: usize = 84;
+
+/// Bytes of an element: what a solution keeps of it, 175, and while it is solved, 256; the rest is the field that is shown.
+const ELEMENT: usize = 500;
+
+fn of_element(lights: usize) -> usize {
+    ELEMENT + lights * size_of::<Bands>()
+}
+
+/// Bytes of a scene with its mesh and its tree.
+fn held(tracer: &Tracer) -> usize {
+    tracer.scene.bytes() + tracer.mesh.bytes() + tracer.bytes()
+}
+
+/// Bytes of a solution of so many elements in so many cells with `rays` each and direct light of so many lights, with all that it
+/// is made of.
+pub(crate) fn solution(tracer: &Tracer, (elements, cells): (usize, usize), rays: usize, lights: usize) -> usize {
+    let of_elements = elements.saturating_mul(of_element(lights));
+    held(tracer).saturating_add(of_elements).saturating_add(cells.saturating_mul(rays * size_of::<u32>()))
+}
+
+/// The smallest limit of memory within which light can be found in a scene: what it takes to weld it, to build its tree, or to solve
+/// for one element on each side that has any. Told from counts, before any of that is taken.
+pub fn least_memory(scene: &Scene) -> usize {
+    let triangles = scene.triangles.len();
+    let two_sided = scene.objects.iter().filter(|object| scene.materials[object.material].has_two_sides());
+    let sides = triangles + two_sided.map(|object| object.triangles.len()).sum::<usize>();
+    let welded = scene.bytes() + triangles * WELDED + size_of_val(&*scene.positions);
+    let of_side = of_element(Luminaires::most(scene)) + LEAST_RAYS * size_of::<u32>();
+    let solved = welded + triangles * IN_TREE + sides * of_side;
+    (scene.bytes() + triangles * WELDING).max(welded + triangles * BUILDING).max(solved)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Error, MeasureOptions, SolveOptions, measure};
+    use glam::DVec3;
+    use radiosity_scene::{Material, Mesh};
+
+    /// Within the limit that is told beforehand a scene is solved; within less it is refused, with the limit that would do.
+    #[test]
+    fn the_least_memory_is_enough() {
+        let matte = Material::default();
+        let lamp = Material { emissive: [100.0; 3], ..matte.clone() };
+        let mut scene = Scene { materials: vec![matte, lamp], ..Scene::default() };
+        // A floor of forty thousand tiles, and a lamp above it.
+        for k in 0..20_000u32 {
+            let low = DVec3::new(f64::from(k % 200), f64::from(k / 200), 0.01 * f64::from(k % 3)) * 0.1;
+            scene.add_quad(
+                "tile",
+                0,
+                [low, low + DVec3::X * 0.1, low + DVec3::new(0.1, 0.1, 0.0), low + DVec3::Y * 0.1],
+            );
+        }
+        let corner = |x: f64, y: f64| DVec3::new(x, y, 3.0);
+        scene.add_quad("lamp", 1, [corner(9., 4.), corner(9., 6.), corner(11., 6.), corner(11., 4.)]);
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let points = [(DVec3::new(1.05, 1.05, 0.1), DVec3::Z)];
+        let within = |memory: usize| {
+            let solve = SolveOptions { memory, ..MeasureOptions::default().solve };
+            measure(
+                &tracer,
+                &points,
+                &MeasureOptions { error: 0.2, rounds: 0, solve, ..MeasureOptions::default() },
+                &(),
+            )
+        };
+        let least = least_memory(&scene);
+        assert!(within(least).is_ok_and(|measured| measured.irradiance[0][0] > 0.0));
+        assert!(
+            matches!(within(least / 2), Err(Error::Memory { least: told, needed, .. }) if told == least && needed > least / 2)
+        );
+        // What is held is what was told, within what only some scenes need.
+        assert!(held(&tracer) < least && least < 4 * held(&tracer) + scene.triangles.len() * ELEMENT, "{least}");
+    }
+}
