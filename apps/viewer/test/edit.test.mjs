@@ -536,8 +536,8 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   assert.equal((await state(page)).objects.find(({ id }) => id === box.id).successor, tall.id);
   assert.equal((await state(page)).undo, 'resize Box 1');
   // Taken back and made again, it stays selected.
+  await page.keyboard.press('Escape');
   for (const [key, id] of [['z', box.id], ['y', tall.id]]) {
-    await page.keyboard.press('Escape');
     await page.keyboard.press(`Control+${key}`);
     await selected(id - first);
   }
