@@ -83,8 +83,10 @@ export class App {
   private news = new Set<Topic>();
   /** Where copies will be that were asked for: the first that comes is selected. */
   private awaited: number[][] = [];
-  /** Forms that were asked for and have not come. */
-  private wished = new Map<number, Shaped>();
+  /** Forms that were asked for last and have not come, and how many times others were. */
+  private wished = new Map<number, Shaped & { times: number }>();
+  /** What was added and selected last. */
+  private known: (ObjectNotice & Shaped)[] = [];
   /** Which new lamp will be selected. */
   private awaitedLamp: ((light: LightNotice) => boolean) | null = null;
   private loosened = new Set<number>();
@@ -171,7 +173,7 @@ export class App {
         break;
       }
       case 'object':
-        this.wished.delete(notice.id);
+        this.pass(notice);
         this.welcome(notice);
         this.objectsAhead.hear(notice);
         break;
@@ -181,6 +183,8 @@ export class App {
       case 'status':
         // Another page may have changed something.
         if (this.status && notice.edits !== this.status.edits) this.exposure.hold();
+        // All has come that was asked for.
+        if (!notice.is_following) this.wished.clear();
         this.status = notice;
         this.tell('status');
         break;
@@ -253,8 +257,7 @@ export class App {
     surface.matrix.fromArray(object.matrix);
     this.stage.moved(surface);
     this.followed(surface);
-    if (object.deleted && this.selected === id) this.mark(this.heir(object));
-    else if (this.group().includes(surface)) {
+    if (!this.inherit() && this.group().includes(surface)) {
       this.marks.outline(this.group());
       this.gizmo.place();
       this.tellSoon('selection');
@@ -277,6 +280,15 @@ export class App {
     this.tellSoon('lights');
   }
 
+  /** What is gone is selected no longer, but what it became, once that is here; whether it was so. */
+  private inherit(): boolean {
+    const chosen = this.selected === null ? undefined : this.objects.get(this.selected);
+    if (!chosen?.deleted) return false;
+    const heir = this.heir(chosen);
+    if (heir === null || this.stage.surfaces.has(heir)) this.mark(heir);
+    return true;
+  }
+
   /** What something that is gone has become, as far as that is known: what became of that may not have been heard yet. */
   private heir({ successor }: ObjectNotice): number | null {
     let heir = successor;
@@ -286,6 +298,14 @@ export class App {
       heir = this.objects.get(heir)!.successor;
     }
     return heir !== null && seen.has(heir) ? successor : heir;
+  }
+
+  /** What was asked for of something that has become another since is asked for of that, if it was asked for more than once. */
+  private pass({ id, successor }: ObjectNotice): void {
+    const wished = this.wished.get(id);
+    if (!wished || successor === null) return;
+    this.wished.delete(id);
+    if (wished.times > 1) this.wished.set(successor, { ...wished, times: wished.times - 1 });
   }
 
   /** Whether an object is one of the copies that were asked for. */
@@ -589,16 +609,25 @@ export class App {
     this.edit(edits.length === 1 ? edits[0] : { several: edits });
   }
 
-  /** What is selected if it was added, in the forms that were asked for last; nothing else. */
+  /** What is selected if it was added, in the forms that were asked for last; nothing else. What has just become another is as it was
+   *  until that is here. */
   parts(): (ObjectNotice & Shaped)[] {
+    const chosen = this.selected === null ? undefined : this.objects.get(this.selected);
+    if (chosen?.deleted) return this.known;
     const objects = this.group().map(({ object }) => ({ ...this.objects.get(object)!, ...this.wished.get(object) }));
-    return objects.every(({ form }) => form) ? objects : [];
+    this.known = objects.every(({ form }) => form) ? objects : [];
+    return this.known;
   }
 
   /** Gives what is selected, and was added, other lengths, metres. */
   resize(size: number[]): void {
     const edits = reshaped(this.parts(), size);
-    for (const edit of edits) if ('reshape' in edit) this.wished.set(edit.reshape.object, edit.reshape);
+    for (const edit of edits) {
+      if (!('reshape' in edit)) continue;
+      const { object: id, form, matrix } = edit.reshape;
+      this.wished.set(id, { form, matrix, times: (this.wished.get(id)?.times ?? 0) + 1 });
+      this.known = this.known.map((part) => (part.id === id ? { ...part, form, matrix } : part));
+    }
     this.edit(edits.length === 1 ? edits[0] : { several: edits });
   }
 

@@ -157,6 +157,8 @@ export function thingPanel(app: App): HTMLElement {
   const show = () => {
     const object = app.selected === null ? undefined : app.objects.get(app.selected);
     const light = app.selectedLight === null ? undefined : app.lights.get(app.selectedLight);
+    // What it became is on its way: a person may be writing into a field.
+    if (object?.deleted) return;
     offer();
     const placed = object ?? light;
     body.hidden = !placed;
