@@ -56,6 +56,43 @@ export function cells(size: [number, number]): [number, number] {
   return [Math.ceil(size[0] / p - 1e-9), Math.ceil(size[1] / p - 1e-9)];
 }
 
+/** Directions that differ by less are taken for one: parts of a quarter turn. */
+const DIRECTIONS = 900;
+
+/** A rectangle around points of a plane: its axes, and its corners along them. One side is level; where all are, it is the
+ * smallest with a side along one of `sides` (Freeman and Shapira 1975). */
+export function rectangle(points: Vector3[], origin: Vector3, normal: Vector3, sides: Vector3[]) {
+  const up = new Vector3(0, 1, 0);
+  const isLevel = Math.abs(normal.dot(up)) >= 0.99;
+  const right = isLevel ? new Vector3(1, 0, 0).cross(normal).cross(normal).negate().normalize() : up.cross(normal).normalize();
+  const forward = normal.clone().cross(right);
+  const flat = points.map((p) => [p.dot(right) - origin.dot(right), p.dot(forward) - origin.dot(forward)]);
+  const turned = (angle: number) => {
+    const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
+    const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
+    for (const [x, y] of flat) {
+      [cosine * x + sine * y, cosine * y - sine * x].forEach((at, i) => {
+        low[i] = Math.min(low[i], at);
+        high[i] = Math.max(high[i], at);
+      });
+    }
+    return { angle, low, high, area: (high[0] - low[0]) * (high[1] - low[1]) };
+  };
+  let best = turned(0);
+  const tried = new Set([0]);
+  for (const side of isLevel ? sides : []) {
+    const turn = Math.atan2(side.dot(forward), side.dot(right)) / (Math.PI / 2);
+    const direction = Math.round((turn - Math.floor(turn)) * DIRECTIONS) % DIRECTIONS;
+    if (tried.has(direction)) continue;
+    tried.add(direction);
+    const found = turned((turn - Math.round(turn)) * (Math.PI / 2));
+    // By more than rounding.
+    if (found.area < best.area * (1 - 1e-6)) best = found;
+  }
+  const u = right.multiplyScalar(Math.cos(best.angle)).addScaledVector(forward, Math.sin(best.angle));
+  return { u, v: normal.clone().cross(u), low: best.low, high: best.high };
+}
+
 /** Lays a grid over the plane that was hit. */
 export function lay({ surface, triangle, uv }: Hit): Grid | null {
   const world = (k: number) => corners(surface, k).map((p) => p.applyMatrix4(surface.matrixWorld));
@@ -65,26 +102,18 @@ export function lay({ surface, triangle, uv }: Hit): Grid | null {
   surface.geometry.boundingSphere ?? surface.geometry.computeBoundingSphere();
   const thick = FLAT * Math.max(1e-3, surface.geometry.boundingSphere!.radius * surface.matrixWorld.getMaxScaleOnAxis());
 
-  // Axes along the surface: level where there is a level direction.
-  const up = new Vector3(0, 1, 0);
-  const u = (Math.abs(normal.dot(up)) < 0.99 ? up.clone().cross(normal) : new Vector3(1, 0, 0).cross(normal).cross(normal).negate()).normalize();
-  const v = normal.clone().cross(u);
-
   const own = new Set<number>();
-  const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
+  const sides: Vector3[] = [];
+  const around: Vector3[] = [];
   for (let k = 0; k < surface.geometry.index!.count / 3; k += 1) {
     const points = world(k);
     if (normalOf(points).dot(normal) < PARALLEL) continue;
     if (points.some((p) => Math.abs(p.clone().sub(origin).dot(normal)) > thick)) continue;
     own.add(k);
-    for (const p of points) {
-      [u, v].forEach((axis, i) => {
-        const at = p.clone().sub(origin).dot(axis);
-        low[i] = Math.min(low[i], at);
-        high[i] = Math.max(high[i], at);
-      });
-    }
+    around.push(...points);
+    sides.push(...points.map((p, i) => points[(i + 1) % 3].clone().sub(p)));
   }
+  const { u, v, low, high } = rectangle(around, origin, normal, sides);
   const size: [number, number] = [high[0] - low[0], high[1] - low[1]];
   if (!(Math.min(...size) > 0)) return null;
   let counts = cells(size);

@@ -135,6 +135,16 @@ test('points of a grid beneath things are left out and counted', async () => {
   assert.ok((await state(page)).grid.least > 0.1 * laid.mean);
   await page.keyboard.press('Control+z');
   await page.waitForFunction((covered) => window.radiosity.state().grid.covered === covered, laid.covered);
+  // The lid of a block that stands askew: rows run along its sides.
+  const lid = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const at = app.grid.points[0].point.clone().set(0.186, 0.165, 0.169).project(app.stage.camera);
+    app.pick(at.x, at.y);
+    app.measure();
+    return window.radiosity.state().grid;
+  });
+  const sides = [0, 1].map((k) => Math.hypot(blocks[0][k][0] - blocks[0][k + 1][0], blocks[0][k][1] - blocks[0][k + 1][1]));
+  assert.deepEqual([...lid.size].sort().map((side) => side.toFixed(2)), sides.sort().map((side) => side.toFixed(2)));
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });

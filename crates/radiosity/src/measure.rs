@@ -276,17 +276,18 @@ fn gathered(
         let own_places: Vec<Place> = own.iter().map(|&i| places[i]).collect();
         let answer = solution.gathered(&own_places, scaled(gather, FEWEST_GATHERED), &shadowing, monitor)?;
         for (&i, e) in own.iter().zip(&answer.irradiance) {
-            irradiance[i] = *e;
+            // What paths find beyond what they look up may be less than nothing.
+            irradiance[i] = e.map(|e| e.max(0.0));
         }
     }
     Ok(irradiance)
 }
 
-/// Times as many rays for the next round after one that ended at an error, relative to that asked: a power of two.
+/// Times as many rays for the next round after one that ended at an error, relative to that asked.
 fn growth(error: f64) -> usize {
     // Error ∝ M^−0.7, as that of stratified samples is.
     let wanted = (error / AIM).powf(1.0 / 0.7).clamp(2.0, MOST_GROWTH);
-    (wanted.ceil() as usize).next_power_of_two()
+    wanted.ceil() as usize
 }
 
 /// Two rounds that leave more than this part of the error before them are the last: what remains is not noise. One

@@ -22,6 +22,10 @@ const PILOT: u32 = 8;
 /// The stream of sample points that exposure uses.
 const EXPOSURE: u32 = 0x0e59;
 
+/// Places along a side of an element that are examined; coarsely.
+const FINE: u32 = 8;
+const COARSE: u32 = 4;
+
 /// Rays that examine one place.
 const PROBE: u32 = 8;
 
@@ -67,6 +71,28 @@ impl Exposure {
         elements: &Elements,
         progress: &impl Progress,
     ) -> Result<Exposure, Stopped> {
+        Exposure::examined(tracer, (mesh, elements), FINE, progress)
+    }
+
+    /// The same at a quarter of the places, for elements that are only looked up: what the mask leaves is rejected place by place.
+    ///
+    /// # Errors
+    /// [`Stopped`] if `progress` says so.
+    pub fn glanced(
+        tracer: &Tracer,
+        mesh: &Mesh,
+        elements: &Elements,
+        progress: &impl Progress,
+    ) -> Result<Exposure, Stopped> {
+        Exposure::examined(tracer, (mesh, elements), COARSE, progress)
+    }
+
+    fn examined(
+        tracer: &Tracer,
+        (mesh, elements): (&Mesh, &Elements),
+        grid: u32,
+        progress: &impl Progress,
+    ) -> Result<Exposure, Stopped> {
         const CHUNK: usize = 1024;
         let done = std::sync::atomic::AtomicUsize::new(0);
         let n = elements.cells();
@@ -74,7 +100,8 @@ impl Exposure {
             .into_par_iter()
             .map(|chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(n);
-                let masks: Vec<_> = range.clone().flat_map(|cell| examine_cell(tracer, mesh, elements, cell)).collect();
+                let masks: Vec<_> =
+                    range.clone().flat_map(|cell| examine_cell(tracer, (mesh, elements), grid, cell)).collect();
                 let so_far = done.fetch_add(range.len(), std::sync::atomic::Ordering::Relaxed) + range.len();
                 progress.step(so_far, n).then_some(masks).ok_or(Stopped)
             })
@@ -138,12 +165,16 @@ fn is_suspect(tracer: &Tracer, site: &Site, sequence: &Sequence) -> bool {
     })
 }
 
-/// The mask of a suspect element.
-fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32) -> u64 {
-    (0..64).fold(0, |mask, cell| {
+/// The mask of a suspect element, by a place in each cell of a grid with so many along a side.
+fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, grid: u32) -> u64 {
+    let wide = FINE / grid;
+    let block = (0..wide).fold(0u64, |block, row| block | ((1 << wide) - 1) << (FINE * row));
+    (0..grid * grid).fold(0, |mask, cell| {
         let [dx, dy, _, _] = sequence.point(PILOT + cell);
-        let place = site.place(((cell % 8) as f32 + dx) / 8.0, ((cell / 8) as f32 + dy) / 8.0);
-        mask | u64::from(!is_buried(tracer, &place, element ^ cell << 24)) << cell
+        let (column, row) = (cell % grid, cell / grid);
+        let place = site.place((column as f32 + dx) / grid as f32, (row as f32 + dy) / grid as f32);
+        let is_open = !is_buried(tracer, &place, element ^ cell << 24);
+        if is_open { mask | block << (wide * (FINE * row + column)) } else { mask }
     })
 }
 
@@ -151,7 +182,7 @@ fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32) -> u
 const LEAST_SHARE: f64 = 0.125;
 
 /// The masks of the elements of a cell that are not wholly exposed.
-fn examine_cell(tracer: &Tracer, mesh: &Mesh, elements: &Elements, cell: usize) -> Vec<(u32, u64)> {
+fn examine_cell(tracer: &Tracer, (mesh, elements): (&Mesh, &Elements), grid: u32, cell: usize) -> Vec<(u32, u64)> {
     let ids = elements.of_cell(cell);
     if elements.share(mesh, ids.start) * (ids.len() as f64) < LEAST_SHARE {
         return Vec::new();
@@ -168,7 +199,7 @@ fn examine_cell(tracer: &Tracer, mesh: &Mesh, elements: &Elements, cell: usize) 
         if divided && !is_suspect(tracer, &site, &sequence) {
             return None;
         }
-        let mask = examine(tracer, &site, &sequence, element);
+        let mask = examine(tracer, &site, &sequence, element, grid);
         (mask != u64::MAX).then_some((element, mask))
     })
     .collect()

@@ -42,6 +42,8 @@ pub(crate) const AGAIN: u32 = 0x0180;
 pub(crate) struct Pilot {
     receivers: Vec<Receiver>,
     side: usize,
+    /// Most luminance that a ray may bring.
+    peak: f64,
     /// Light by receiver and cell.
     light: Vec<f32>,
     /// Running sums of a density over cells: of rows, and of the cells in each row; each ends at 1.
@@ -62,8 +64,9 @@ struct Receiver {
 }
 
 impl Pilot {
-    /// Makes ready for some receivers, of up to `most_rays` rays each, and forgets all others.
-    pub fn begin(&mut self, receivers: usize, most_rays: u32) {
+    /// Makes ready for some receivers, of up to `most_rays` rays each that bring up to `peak`, and forgets all others.
+    pub fn begin(&mut self, receivers: usize, most_rays: u32, peak: f64) {
+        self.peak = peak;
         self.side = 1;
         // One ray to a cell.
         while self.side < MOST_CELLS && 4 * self.side * self.side <= most_rays as usize {
@@ -109,9 +112,15 @@ impl Pilot {
         for other in self.neighbours(k).map(|other| self.receivers[other]) {
             (rays, sum, square) = (rays + other.rays, sum + other.sum, square + other.square);
         }
-        let is_even = sum > 0.0 && sum * sum >= OPEN * f64::from(rays) * square;
+        // (Σ light)² less the part that is asked for: 0 or more where light is even.
+        let margin = sum * sum - OPEN * f64::from(rays) * square;
+        let is_even = sum > 0.0 && margin >= 0.0;
+        // Whether it still were if any number of the rays had met the brightest there is: whoever sends more rays
+        // only then has no other answer on average.
+        let lack = OPEN * f64::from(rays) * self.peak - 2.0 * sum;
+        let stays_even = is_even && (lack <= 0.0 || lack * lack <= 4.0 * margin);
         let first = own.halves.map(|sum| sum.map(|s| 2.0 * s / f64::from(own.rays)));
-        if rays >= TRUSTED && (is_even || sum <= 0.0) {
+        if stays_even || rays >= TRUSTED && (is_even || sum <= 0.0) {
             return first.map(|half| half.map(|e| e as f32));
         }
         let half_rays = own.rays / 2;
@@ -221,7 +230,7 @@ mod tests {
             let mut pilot = Pilot::default();
             for seed in 0..count {
                 let sequence = Sequence::new(seed, 1);
-                pilot.begin(1, rays);
+                pilot.begin(1, rays, 100.0);
                 pilot.receivers[0] = Receiver { plane: Some((0, DVec3::Z)), rays, ..Receiver::default() };
                 let mut sum = 0.0;
                 for point in (0..rays).map(|index| sequence.point(index)).filter(|p| inside(p[0], p[1])) {

@@ -117,10 +117,16 @@ impl<'a> Solution<'a> {
         options.refuse_large_matrices(elements.len())?;
         let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
         let begin = begin(elements.len());
-        let exposure = stages.time(monitor, "exposure", || match Exposure::new(tracer, mesh, &elements, &begin) {
-            // Buried places are rejected one by one then.
-            Err(_) if is_over(monitor) => Ok(Exposure::default()),
-            done => done,
+        let exposure = stages.time(monitor, "exposure", || {
+            let found = match options.looked_up {
+                true => Exposure::glanced(tracer, mesh, &elements, &begin),
+                false => Exposure::new(tracer, mesh, &elements, &begin),
+            };
+            match found {
+                // Buried places are rejected one by one then.
+                Err(_) if is_over(monitor) => Ok(Exposure::default()),
+                done => done,
+            }
         })?;
         let sheets = sheets.exposed(&exposure);
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
@@ -140,6 +146,7 @@ impl<'a> Solution<'a> {
 
         let id_space = IdSpace { elements: &elements, sky };
         let table = HitTable::new(area.clone(), &id_space);
+        let table = if options.looked_up { table.from_afar() } else { table };
         let mut values = vec![[0f32; 4]; id_space.len()];
         for (value, l) in values[elements.len()..].iter_mut().zip(sky.radiosity(&scene.sky)) {
             value[..3].copy_from_slice(&l);
