@@ -218,6 +218,27 @@ fn invert(running: &[f64], x: f64) -> (usize, f64, f64) {
 mod tests {
     use super::*;
 
+    /// Even light is taken as it is only where nothing that a ray may bring could make it uneven.
+    #[test]
+    fn only_what_must_be_even_is_taken_as_it_is() {
+        for (peak, again) in [(4.0, 0), (10.0, 0), (1000.0, 64)] {
+            let mut pilot = Pilot::default();
+            pilot.begin(1, 64, peak);
+            pilot.receivers[0] = Receiver { plane: Some((0, DVec3::Z)), rays: 64, ..Receiver::default() };
+            let sequence = Sequence::new(3, 1);
+            for index in 0..64 {
+                pilot.add(0, usize::from(index >= 32), sequence.point(index), [1.0; 3]);
+            }
+            let mut asked = 0;
+            let halves = pilot.mean(0, (&Sequence::new(3, 2), 0), |_, _| {
+                asked += 1;
+                [1.0; 3]
+            });
+            assert_eq!(asked, again, "{peak}");
+            assert!(halves.iter().flatten().all(|e| (e - 1.0).abs() < 0.2), "{halves:?}");
+        }
+    }
+
     /// A bright spot of the square: its mean comes out whether the first rays met it or not, and with far less noise.
     #[test]
     fn what_was_missed_is_not_lost() {

@@ -467,3 +467,42 @@ impl Transport for HitTable {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ElementReceivers, Exposure};
+    use radiosity_scene::{Material, Mesh, Scene, Sky};
+
+    /// A floor, half of it 1 cm beneath a board, under an even sky: over its area it sees half of that, and the open half all of it.
+    #[test]
+    fn from_afar_the_open_half_is_seen() {
+        let mut scene = Scene { sky: Sky::Uniform([1.0; 3]), ..Scene::default() };
+        scene.materials = vec![Material::default(), Material { double_sided: true, ..Material::default() }];
+        let quad = |low: DVec3, x: f64| [low, low + DVec3::X * x, low + DVec3::new(x, 1.0, 0.0), low + DVec3::Y];
+        scene.add_quad("floor", 0, quad(DVec3::ZERO, 1.0));
+        scene.add_quad("board", 1, quad(DVec3::new(-1.0, 0.0, 0.01), 1.5));
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let elements = Elements::new(&scene, &mesh, 10.0);
+        let sky = SkyPatches::new(&scene.sky, scene.up.direction());
+        let ids = IdSpace { elements: &elements, sky };
+        let exposure = Exposure::default();
+        let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+        let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+        let seen = |table: HitTable| {
+            let mut table = table;
+            table.extend(&tracer, (&ids, &[]), &receivers, 1024, &()).unwrap();
+            let mut sky = vec![[0f32; 4]; ids.len()];
+            sky[elements.len()..ids.len() - 1].fill([1.0; 4]);
+            // The floor is two triangles.
+            let of = |i: usize| area[i] * f64::from(table.rows_mean(&sky)[i][0]);
+            of(0) + of(1)
+        };
+        let whole = seen(HitTable::new(area.clone(), &ids));
+        let open = seen(HitTable::new(area.clone(), &ids).from_afar());
+        assert!((whole - 0.5).abs() < 0.02, "{whole}");
+        // Few tries leave some rays beneath the board of a triangle that has three quarters there.
+        assert!(open > 0.9, "{open}");
+    }
+}
