@@ -1,22 +1,20 @@
 // All that the page knows, and what can be done with it. Panels and keys call the verbs here and listen to topics.
 import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, Quaternion, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
 import { Ahead } from './ahead';
-import { cover } from './cover';
 import { keep, kept, numberOf, type Curve } from './curve';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
 import { boxAhead, panelAhead, reshaped, type Shaped, tiltOf } from './forms';
-import { follow, lay, open, read, type Grid } from './grid';
 import { beside, lampAhead, raysOf, type Lamp, type LampKind, type Sun } from './lamps';
 import { Marks } from './marks';
+import { Measuring } from './measuring';
 import { Navigator } from './navigate';
-import { BORDER, HEIGHT, PlaneAsker, type WorkingPlane } from './plane';
 import { Sight } from './sight';
-import { corners, Stage, type Hit } from './stage';
+import { Stage } from './stage';
 import { Mode, shared, Surface } from './surface';
 import {
   Connection, type CameraPlace, type Edit, type Layer, type LightFrame, type LightNotice, type MeshFrame, type Notice,
-  type NewObject, type ObjectNotice, type PlaneAnswer, type ProbeAnswer, type SceneNotice, type StatusNotice, type TextureUse,
+  type NewObject, type ObjectNotice, type SceneNotice, type StatusNotice, type TextureUse,
 } from './wire';
 
 /** What can change. */
@@ -31,12 +29,6 @@ const READ = 10_000;
 
 const WRAPS = { repeat: RepeatWrapping, mirror: MirroredRepeatWrapping, clamp: ClampToEdgeWrapping } as const;
 
-/** What was measured at a point, and where it is. */
-export interface Probed {
-  hit: Hit;
-  answer: ProbeAnswer | null;
-}
-
 export class App {
   readonly stage = new Stage();
   readonly navigator = new Navigator(this.stage);
@@ -44,6 +36,7 @@ export class App {
   readonly marks = new Marks(this.stage);
   readonly gizmo = new Gizmo(this);
   readonly sight = new Sight(this);
+  readonly measuring = new Measuring(this);
   readonly connection: Connection;
   scene: SceneNotice | null = null;
   /** Objects and lights as they are shown: what the server said, and what is changed here. */
@@ -63,18 +56,11 @@ export class App {
   falseColours = false;
   curve = kept();
   edges = false;
-  raysShown = false;
   selected: number | null = null;
   /** A light without an object that is moved. */
   selectedLight: number | null = null;
   /** Of which kind the next lamp is that is added. */
   lampKind: LampKind | 'panel' = 'point';
-  probed: Probed | null = null;
-  grid: Grid | null = null;
-  /** A working plane; it or the grid is laid, not both. */
-  plane: WorkingPlane | null = null;
-  planeHeight = HEIGHT;
-  planeBorder = BORDER;
   message = '';
   private objectsAhead = new Ahead(this.objects, (object) => this.arrange(object.id));
   private lightsAhead = new Ahead(this.lights, (light) => this.shed(light));
@@ -91,8 +77,6 @@ export class App {
   private awaitedLamp: ((light: LightNotice) => boolean) | null = null;
   private loosened = new Set<number>();
   private textures = new Map<string, Texture>();
-  private question = 0;
-  private planes = new PlaneAsker(this);
   private gesture = 0;
   private pending: { gesture?: number; send: () => void; timer: number } | null = null;
   private lastSent = 0;
@@ -100,8 +84,6 @@ export class App {
   private editing: number | undefined;
   private refusal = '';
   private messageTimer = 0;
-  /** Moves of things up to which it is known what covers the grid. */
-  private gridMoves = 0;
   /** How lights were dimmed before all of them were turned off. */
   private levels = new Map<number, number>();
 
@@ -201,19 +183,16 @@ export class App {
         if (!this.isCaughtUp) this.begin();
         break;
       case 'probe':
-        if (this.probed && notice.question === this.question) {
-          this.probed.answer = notice.answer;
-          this.tell('probe');
-        }
+        this.measuring.hearProbe(notice.question, notice.answer);
         break;
       case 'plane':
-        if (this.planes.hear(notice.question)) this.tellPlane(notice.answer, notice.why);
+        this.measuring.hearPlane(notice.question, notice.answer, notice.why);
         break;
       case 'in_sight':
         this.sight.hear(notice.question, notice.error);
         break;
       case 'rays':
-        if (notice.question === this.question) this.marks.rays(notice.rays);
+        this.measuring.hearRays(notice.question, notice.rays);
         break;
       case 'refused':
         if (notice.code === 'layer') this.rest(notice.message);
@@ -229,7 +208,7 @@ export class App {
     this.isCaughtUp = true;
     this.opened ??= performance.now();
     if (this.selected === null) this.navigator.choose();
-    this.planes.begin();
+    this.measuring.planes.begin();
     this.tell('view');
     this.tell('connection');
   }
@@ -237,10 +216,7 @@ export class App {
   private mesh(frame: MeshFrame): void {
     const surface = new Surface(frame.object, frame);
     this.stage.put(surface);
-    // What was laid on the old one, before the connection was lost, lies on the new one.
-    if (this.grid?.surface.object === frame.object) this.grid.surface = surface;
-    if (this.plane?.surface.object === frame.object) this.plane.surface = surface;
-    if (this.probed?.hit.surface.object === frame.object) this.probed.hit.surface = surface;
+    this.measuring.replace(surface);
     this.arrange(frame.object);
   }
 
@@ -256,13 +232,13 @@ export class App {
     });
     surface.matrix.fromArray(object.matrix);
     this.stage.moved(surface);
-    this.followed(surface);
+    this.measuring.follow(surface);
     if (!this.inherit() && this.group().includes(surface)) {
       this.marks.outline(this.group());
       this.gizmo.place();
       this.tellSoon('selection');
     }
-    if (object.deleted && (this.grid ?? this.plane)?.surface === surface) this.clearGrid();
+    if (object.deleted) this.measuring.lose(surface);
     if (this.edges) this.marks.edges(this.stage.surfaces);
     this.stage.change();
   }
@@ -369,8 +345,7 @@ export class App {
     const surface = this.stage.surfaces.get(frame.object);
     if (surface) this.stage.shine(surface, frame.first, frame.values);
     this.rest('');
-    // What was read before it came is read again.
-    this.asked = '';
+    this.measuring.outdate();
     this.exposure.lit();
   }
 
@@ -379,15 +354,8 @@ export class App {
     this.objectsAhead.expire();
     this.lightsAhead.expire();
     if (!this.isCaughtUp || !this.status) return;
-    const now = `${this.status.rays} ${this.status.edits} ${this.status.is_done} ${JSON.stringify(this.layer)}`;
-    if (now === this.asked) return;
-    this.asked = now;
-    this.askProbe();
-    if (this.grid) this.readGrid();
-    this.planes.ask();
+    this.measuring.refresh(`${this.status.rays} ${this.status.edits} ${this.status.is_done} ${JSON.stringify(this.layer)}`);
   }
-
-  private asked = '';
 
   // What a person does.
 
@@ -766,54 +734,6 @@ export class App {
     this.say(`Selected: ${next.name}.`);
   }
 
-  /** Measures what is at a place of the canvas (−1..1 right and up) and selects its object. */
-  pick(x: number, y: number): void {
-    const hit = this.stage.pick(x, y);
-    if (!hit) {
-      this.probed = null;
-      this.marks.point(null);
-      this.select(null);
-      this.tell('probe');
-      return;
-    }
-    this.probed = { hit, answer: null };
-    this.marks.point(hit);
-    this.select(hit.surface.object);
-    this.askProbe();
-    this.tell('probe');
-  }
-
-  /** What is marked on a surface goes with it. */
-  private followed(surface: Surface): void {
-    this.marks.follow(surface);
-    if (this.grid?.surface === surface) this.readGrid();
-    const hit = this.probed?.hit;
-    if (hit?.surface !== surface) return;
-    const [a, b, c] = corners(surface, hit.triangle).map((corner) => corner.applyMatrix4(surface.matrixWorld));
-    const [v, w] = hit.uv;
-    hit.point.copy(a).multiplyScalar(1 - v - w).addScaledVector(b, v).addScaledVector(c, w);
-    hit.normal.copy(b.sub(a).cross(c.sub(a)).normalize());
-    this.marks.point(hit);
-  }
-
-  private askProbe(): void {
-    if (!this.probed) return;
-    const { surface, triangle, uv } = this.probed.hit;
-    if (!this.stage.surfaces.has(surface.object)) return;
-    this.question += 1;
-    const about = { question: this.question, object: surface.object, triangle };
-    this.connection.send({ kind: 'probe', ...about, uv });
-    if (this.raysShown) this.connection.send({ kind: 'rays', ...about });
-  }
-
-  showRays(is: boolean): void {
-    this.raysShown = is;
-    if (!is) this.marks.rays([]);
-    else if (this.probed) this.askProbe();
-    else this.say('Pick a point first: its rays are drawn then.');
-    this.tell('view');
-  }
-
   showEdges(is: boolean): void {
     this.edges = is;
     this.marks.edges(is ? this.stage.surfaces : new Map());
@@ -859,78 +779,6 @@ export class App {
     this.exposure.meter();
     this.tell('view');
     this.stage.change();
-  }
-
-  /** Lays a grid of measuring points over the surface that was picked. */
-  measure(): void {
-    if (!this.probed) return this.say('Pick a point of a surface first: the grid is laid over it.');
-    this.plane = null;
-    this.marks.plane(null);
-    this.grid = lay(this.probed.hit);
-    this.gridMoves = -1;
-    if (!this.grid) this.say('There is no plane surface to lay a grid over.');
-    this.readGrid();
-    this.tell('grid');
-    this.tell('view');
-  }
-
-  /** Lays a working plane above the floor that was picked. */
-  measurePlane(): void {
-    if (!this.probed) return this.say('Pick a point of a floor first: the working plane is laid above it.');
-    this.clearGrid();
-    this.say('');
-    const { surface, triangle, uv } = this.probed.hit;
-    this.plane = { surface, triangle, uv, height: this.planeHeight, border: this.planeBorder, answer: null };
-    this.planes.begin();
-    this.tell('grid');
-  }
-
-  /** The plane that is laid gets another height or another zone along the walls, metres. */
-  setPlane(height: number, border: number): void {
-    [this.planeHeight, this.planeBorder] = [height, border];
-    if (this.plane) {
-      // Numbers of the old plane would be taken for those of this one.
-      Object.assign(this.plane, { height, border, answer: null });
-      this.marks.plane(null);
-      this.planes.begin();
-    }
-    this.tell('grid');
-    this.tell('view');
-  }
-
-  private tellPlane(answer: PlaneAnswer | null, why: string | null): void {
-    if (!this.plane) return;
-    if (!answer) {
-      this.clearGrid();
-      return this.say(why ?? '');
-    }
-    this.plane.answer = answer;
-    this.marks.plane(answer);
-    this.tell('grid');
-    this.tell('view');
-  }
-
-  /** The grid where its surface is now, in the light of now. */
-  private readGrid(): void {
-    if (this.grid && this.gridMoves !== this.stage.moves) {
-      this.gridMoves = this.stage.moves;
-      cover(this, this.grid, follow(this.grid));
-    }
-    if (this.grid && open(this.grid).length === 0) {
-      this.say('All points of the grid lie beneath things.');
-      return this.clearGrid();
-    }
-    if (this.grid) read(this.grid);
-    this.marks.grid(this.grid);
-    this.tell('grid');
-  }
-
-  clearGrid(): void {
-    this.grid = this.plane = null;
-    this.marks.grid(null);
-    this.marks.plane(null);
-    this.tell('grid');
-    this.tell('view');
   }
 
   look(place: CameraPlace): void {

@@ -5,7 +5,7 @@ import { measured } from './plane';
 
 /** Hands the points of the grid or of the plane to the person: with normals, as `radiosity measure` reads points. */
 export function savePoints(app: App): void {
-  const { grid, plane, stage } = app;
+  const { measuring: { grid, plane }, stage } = app;
   const normal = grid && stage.toScene(grid.normal);
   const [u, v] = plane?.answer?.axes ?? [[], []];
   const up = normal?.toArray() ?? [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];

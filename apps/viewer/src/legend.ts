@@ -25,7 +25,7 @@ export function legend(app: App): HTMLElement {
 }
 
 /** Whether colours stand for numbers, and whether colours or lines do. */
-const isColoured = (app: App): boolean => app.falseColours || isError(app.layer) || Boolean(app.plane?.answer);
+const isColoured = (app: App): boolean => app.falseColours || isError(app.layer) || Boolean(app.measuring.plane?.answer);
 const isScaled = (app: App): boolean => isColoured(app) || shared.isolines.value;
 
 /** Where a value is on the scale, 0..1. */

@@ -75,9 +75,9 @@ function start(): void {
     const [x, y] = [event.clientX - box.left, event.clientY - box.top];
     const lamp = app.marks.lampAt(x, y);
     // A pointer that is locked points to the middle.
-    if (document.pointerLockElement === canvas) app.pick(0, 0);
+    if (document.pointerLockElement === canvas) app.measuring.pick(0, 0);
     else if (lamp !== null) app.selectLight(lamp);
-    else app.pick((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
+    else app.measuring.pick((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
   });
   // The cross shows where a keyboard measures; a pointer has its own.
   addEventListener('keydown', () => document.body.classList.add('by-keys'));

@@ -40,7 +40,7 @@ export class PlaneAsker {
 
   /** Asks again, at once or after the answer that is awaited. */
   ask(): void {
-    const { plane, connection } = this.app;
+    const { measuring: { plane }, connection } = this.app;
     this.isDue = this.isWaiting;
     if (!plane || this.isWaiting) return;
     this.question += 1;
@@ -58,7 +58,7 @@ export class PlaneAsker {
 }
 
 /** Whether a plane tells of light that still changes, or of a scene before the last change; else nothing. */
-export function lateness({ plane, status }: App): string {
+export function lateness({ measuring: { plane }, status }: App): string {
   if (!plane) return '';
   if (!plane.answer) return 'Measuring …';
   if (status && plane.answer.edits !== status.edits) return 'The numbers are those before the last change; new ones are on their way.';
@@ -66,7 +66,7 @@ export function lateness({ plane, status }: App): string {
 }
 
 /** The points that are written on the picture and saved: of the plane or of the grid. */
-export function measured({ plane, grid, stage }: App): { point: Vector3; lux: number }[] {
+export function measured({ measuring: { plane, grid }, stage }: App): { point: Vector3; lux: number }[] {
   if (plane?.answer) return plane.answer.points.map(([x, y, z, lux]) => ({ point: stage.toWorld([x, y, z]), lux }));
   return grid ? open(grid) : [];
 }

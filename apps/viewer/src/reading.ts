@@ -6,7 +6,7 @@ import { readable } from './scale';
 export function reading(app: App): { element: HTMLElement; update(): void } {
   const element = el('div', { class: 'reading', id: 'reading', role: 'status', hidden: true });
   const update = () => {
-    const { probed, stage } = app;
+    const { measuring: { probed }, stage } = app;
     const at = probed?.answer && document.body.classList.contains('folded') ? stage.project(probed.hit.point) : null;
     element.hidden = !at;
     if (!at) return;

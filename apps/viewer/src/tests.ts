@@ -99,13 +99,13 @@ export function tests(app: App) {
       mode: app.navigator.mode,
       frames: app.stage.frames,
       received: app.connection.received,
-      grid: app.grid && {
-        least: app.grid.least, mean: app.grid.mean, largest: app.grid.largest, count: app.grid.points.length, covered: app.grid.points.filter(({ isCovered }) => isCovered).length, cell: app.grid.cell, size: app.grid.size,
-        first: app.grid.points[0].point.toArray(),
+      grid: app.measuring.grid && {
+        least: app.measuring.grid.least, mean: app.measuring.grid.mean, largest: app.measuring.grid.largest, count: app.measuring.grid.points.length, covered: app.measuring.grid.points.filter(({ isCovered }) => isCovered).length, cell: app.measuring.grid.cell, size: app.measuring.grid.size,
+        first: app.measuring.grid.points[0].point.toArray(),
       },
-      plane: app.plane && { height: app.plane.height, border: app.plane.border, ...app.plane.answer },
+      plane: app.measuring.plane && { height: app.measuring.plane.height, border: app.measuring.plane.border, ...app.measuring.plane.answer },
       layer: app.layer,
-      probe: app.probed?.answer ?? null,
+      probe: app.measuring.probed?.answer ?? null,
       exposure: app.exposure.value,
       inSight: app.sight.error,
     }),

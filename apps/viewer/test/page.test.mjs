@@ -74,8 +74,8 @@ test('a measuring grid stays where it was laid, as fine as the standard asks', a
   await done(page);
   const laid = await page.evaluate(() => {
     const { app } = window.radiosity;
-    app.pick(0, -0.9);
-    app.measure();
+    app.measuring.pick(0, -0.9);
+    app.measuring.measure();
     return window.radiosity.state().grid;
   });
   // EN 12464-1: p = 0.2 · 5^lg d, d the longer side of what is no strip.
@@ -85,7 +85,7 @@ test('a measuring grid stays where it was laid, as fine as the standard asks', a
   const { edits } = (await state(page)).status;
   await page.evaluate(() => {
     const { app } = window.radiosity;
-    app.pick(0.3, 0.9);
+    app.measuring.pick(0.3, 0.9);
     app.setLight(app.lights.get(0), { dimming: 0.5 });
   });
   await done(page, edits + 1);
@@ -108,8 +108,8 @@ test('points of a grid beneath things are left out and counted', async () => {
   await done(page);
   const laid = await page.evaluate(() => {
     const { app } = window.radiosity;
-    app.pick(0, -0.9);
-    app.measure();
+    app.measuring.pick(0, -0.9);
+    app.measuring.measure();
     return window.radiosity.state().grid;
   });
   // Both blocks have no base: where their sides meet the floor, metres.
@@ -118,7 +118,7 @@ test('points of a grid beneath things are left out and counted', async () => {
     const [x1, z1] = corners[(k + 1) % 4];
     return (x1 - x0) * (z - z0) - (z1 - z0) * (x - x0) > 0;
   }));
-  const points = await page.evaluate(() => window.radiosity.app.grid.points.map(({ point: { x, z }, isCovered }) => [x, z, isCovered]));
+  const points = await page.evaluate(() => window.radiosity.app.measuring.grid.points.map(({ point: { x, z }, isCovered }) => [x, z, isCovered]));
   for (const point of points) assert.equal(point[2], isBeneath(point), String(point));
   assert.ok(laid.covered > 1, `${laid.covered}`);
   assert.ok(laid.least > 0.1 * laid.mean, `${laid.least} of ${laid.mean} lx: nothing is read beneath them`);
@@ -138,9 +138,9 @@ test('points of a grid beneath things are left out and counted', async () => {
   // The lid of a block that stands askew: rows run along its sides.
   const lid = await page.evaluate(() => {
     const { app } = window.radiosity;
-    const at = app.grid.points[0].point.clone().set(0.186, 0.165, 0.169).project(app.stage.camera);
-    app.pick(at.x, at.y);
-    app.measure();
+    const at = app.measuring.grid.points[0].point.clone().set(0.186, 0.165, 0.169).project(app.stage.camera);
+    app.measuring.pick(at.x, at.y);
+    app.measuring.measure();
     return window.radiosity.state().grid;
   });
   const sides = [0, 1].map((k) => Math.hypot(blocks[0][k][0] - blocks[0][k + 1][0], blocks[0][k][1] - blocks[0][k + 1][1]));
@@ -161,7 +161,7 @@ test('a working plane lies in the air of the room, as `measure` has it, and foll
   // The box is half a metre high: at desk height there is no room, and the page says so.
   await page.evaluate(() => {
     document.querySelector('#grid').open = true;
-    window.radiosity.app.pick(0, -0.9);
+    window.radiosity.app.measuring.pick(0, -0.9);
   });
   await page.locator('#grid button', { hasText: 'Working plane' }).click();
   await page.waitForFunction(() => /No working plane/.test(window.radiosity.state().message));
@@ -192,15 +192,15 @@ test('a working plane lies in the air of the room, as `measure` has it, and foll
   // At another height nothing of it stays; back there it is the same again.
   const begun = await page.evaluate(() => {
     const { app } = window.radiosity;
-    app.setPlane(0.2, 0.04);
+    app.measuring.setPlane(0.2, 0.04);
     const { hidden } = document.querySelector('#grid .facts');
-    return [app.plane.answer, hidden, document.querySelector('#grid').innerText.includes('Measuring …')];
+    return [app.measuring.plane.answer, hidden, document.querySelector('#grid').innerText.includes('Measuring …')];
   });
   assert.deepEqual(begun, [null, true, true]);
   await answered(edits);
   const higher = await plane();
   assert.ok(higher.points.length > 0 && higher.points.every(([, y]) => Math.abs(y - 0.2) < 1e-6));
-  await page.evaluate(() => window.radiosity.app.setPlane(0.1, 0.04));
+  await page.evaluate(() => window.radiosity.app.measuring.setPlane(0.1, 0.04));
   await answered(edits);
   assert.deepEqual((await plane()).points, laid.points);
 
@@ -251,7 +251,7 @@ test('what is laid is shown in the panel by itself, and its numbers do not lie b
   });
   assert.equal(await page.locator('#grid').evaluate(({ open }) => open), false);
   await page.evaluate(() => {
-    window.radiosity.app.pick(0, -0.9);
+    window.radiosity.app.measuring.pick(0, -0.9);
     document.querySelector('.panel').scrollTop = 0;
   });
   await page.keyboard.press('g');
@@ -269,11 +269,11 @@ test('what is laid is shown in the panel by itself, and its numbers do not lie b
     const { app } = window.radiosity;
     app.showFalseColours(true);
     const { camera } = app.stage;
-    const [a, b] = app.grid.points.map(({ point }) => point);
+    const [a, b] = app.measuring.grid.points.map(({ point }) => point);
     const span = a.distanceTo(b);
-    camera.position.copy(app.grid.points[0].point);
+    camera.position.copy(app.measuring.grid.points[0].point);
     camera.position.y += 8 * span;
-    camera.lookAt(app.grid.points[0].point);
+    camera.lookAt(app.measuring.grid.points[0].point);
     // Its first point is moved from the middle of the picture into the corner.
     camera.translateX(0.72 * 8 * span * Math.tan((camera.fov * Math.PI) / 360) * camera.aspect);
     camera.translateY(0.5 * 8 * span * Math.tan((camera.fov * Math.PI) / 360));
@@ -285,7 +285,7 @@ test('what is laid is shown in the panel by itself, and its numbers do not lie b
         const boxes = [...document.querySelectorAll('.numbers-over span:not([hidden])')].map((span) => span.getBoundingClientRect());
         const isOver = (box) => box.right > scale.left && box.left < scale.right && box.bottom > scale.top && box.top < scale.bottom;
         const page = app.stage.canvas.getBoundingClientRect();
-        const points = app.grid.points.map(({ point }) => app.stage.project(point)).filter((at) => at).map(({ x, y }) => [x + page.left, y + page.top]);
+        const points = app.measuring.grid.points.map(({ point }) => app.stage.project(point)).filter((at) => at).map(({ x, y }) => [x + page.left, y + page.top]);
         const there = points.filter(([x, y]) => x > scale.left && x < scale.right + 12 && y > scale.top && y < scale.bottom);
         seen([boxes.filter(isOver).length, boxes.length, there.length]);
       }, 800);
@@ -352,13 +352,13 @@ test('isolines have their numbers where they are', async () => {
   console.log(`${written.length} numbers on isolines, off by up to ${(100 * Math.max(...written.map(([number, lux]) => Math.abs(lux / number - 1)))).toFixed(1)} %`);
   // They go with the lines, and make place for a grid.
   await page.evaluate(() => {
-    window.radiosity.app.pick(0, -0.9);
-    window.radiosity.app.measure();
+    window.radiosity.app.measuring.pick(0, -0.9);
+    window.radiosity.app.measuring.measure();
   });
   const counts = () => page.locator('.numbers-over').evaluateAll((all) => all.map((one) => one.children.length));
   await page.waitForFunction(() => document.querySelectorAll('.numbers-over')[1].children.length === 0);
   assert.ok((await counts())[0] > 4);
-  await page.evaluate(() => window.radiosity.app.clearGrid());
+  await page.evaluate(() => window.radiosity.app.measuring.clearGrid());
   await page.waitForFunction(() => document.querySelectorAll('.numbers-over')[1].children.length > 4);
   await page.keyboard.press('i');
   await page.waitForFunction(() => document.querySelectorAll('.numbers-over')[1].children.length === 0);

@@ -17,7 +17,7 @@ export function meterPanel(app: App): HTMLElement {
   const surfaces = el('div', { class: 'bars' });
   const body = el('div', {}, lux, facts, el('h3', {}, 'From which light, reflections included'), lights, el('h3', {}, 'From where it arrives'), surfaces);
   app.on('probe', () => {
-    const { probed } = app;
+    const { probed } = app.measuring;
     body.hidden = !probed;
     none.hidden = Boolean(probed);
     if (!probed) return;
@@ -49,13 +49,13 @@ export function gridPanel(app: App): HTMLElement {
   const facts = el('div', { class: 'facts' });
   const warning = el('p', { class: 'warning' });
   const metres = (sides: number[]) => `${sides.map((side) => side.toFixed(2)).join(' × ')} m`;
-  const clear = button('Take away', () => app.clearGrid());
+  const clear = button('Take away', () => app.measuring.clearGrid());
   const csv = button('Save points as CSV', () => savePoints(app));
   const length = (label: string) => el('input', { type: 'number', min: 0, step: 0.05, 'aria-label': `${label}, metres`, change: () => set() });
   const [height, border] = [length('Height of the working plane'), length('Zone along walls that is left out')];
   const set = () => {
     const lengths = [height, border].map((input) => input.valueAsNumber);
-    if (lengths.every((metres) => metres >= 0)) app.setPlane(lengths[0], lengths[1]);
+    if (lengths.every((metres) => metres >= 0)) app.measuring.setPlane(lengths[0], lengths[1]);
     else app.say('Height and zone are metres, 0 or more.');
   };
   const field = (label: string, input: HTMLElement) =>
@@ -63,8 +63,8 @@ export function gridPanel(app: App): HTMLElement {
   /** What was laid last, once its numbers have been shown. */
   let shown: object | null = null;
   app.on('grid', () => {
-    const { grid, plane } = app;
-    for (const [input, value] of [[height, app.planeHeight], [border, app.planeBorder]] as const) {
+    const { grid, plane } = app.measuring;
+    for (const [input, value] of [[height, app.measuring.planeHeight], [border, app.measuring.planeBorder]] as const) {
       if (!isOpen(input)) input.value = String(value);
     }
     clear.hidden = !grid && !plane;
@@ -97,11 +97,11 @@ export function gridPanel(app: App): HTMLElement {
     element.open = true;
     element.scrollIntoView({ block: 'nearest' });
   });
-  for (const topic of ['view', 'status'] as const) app.on(topic, () => { if (app.grid || app.plane) app.tell('grid'); });
+  for (const topic of ['view', 'status'] as const) app.on(topic, () => { if (app.measuring.grid || app.measuring.plane) app.tell('grid'); });
   element.lastElementChild!.append(
     el('p', { class: 'quiet' }, 'Cells are no larger than EN 12464-1 asks. A grid stays until another is laid.'),
-    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measure(), { key: 'G', title: 'Over the whole plane that was picked, in the layer that is shown; points beneath things are left out' })),
-    el('div', { class: 'row' }, button('Working plane above it', () => app.measurePlane(), { key: 'Shift+G', title: 'In the air above the picked floor, as far as the room goes; points within things are left out' })),
+    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measuring.measure(), { key: 'G', title: 'Over the whole plane that was picked, in the layer that is shown; points beneath things are left out' })),
+    el('div', { class: 'row' }, button('Working plane above it', () => app.measuring.measurePlane(), { key: 'Shift+G', title: 'In the air above the picked floor, as far as the room goes; points within things are left out' })),
     field('Height above it', height), field('Left out along walls', border),
     warning, facts, el('div', { class: 'row' }, csv, clear));
   return element;

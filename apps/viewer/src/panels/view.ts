@@ -35,7 +35,7 @@ export function viewPanel(app: App): HTMLElement {
   const automatic = toggle('Automatic exposure', (is) => (is ? app.exposure.automatic() : app.exposure.set(app.exposure.value)), '0');
   const isolines = toggle('Isolines', (is) => app.showIsolines(is), 'I');
   const edges = toggle('Edges of elements', (is) => app.showEdges(is), 'E');
-  const rays = toggle('Rays of the picked element', (is) => app.showRays(is), 'T');
+  const rays = toggle('Rays of the picked element', (is) => app.measuring.showRays(is), 'T');
   const layer = el('select', {
     id: 'layer', 'aria-label': 'Layer of light', change: () => app.showLayer(JSON.parse(layer.value) as Layer),
   });
@@ -73,11 +73,11 @@ export function viewPanel(app: App): HTMLElement {
     automatic.set(app.exposure.isAutomatic);
     isolines.set(shared.isolines.value);
     edges.set(app.edges);
-    rays.set(app.raysShown);
+    rays.set(app.measuring.raysShown);
     layer.value = JSON.stringify(app.layer);
     resting.textContent = app.resting;
     resting.hidden = !app.resting;
-    scale.hidden = !app.falseColours && !shared.isolines.value && !isError(app.layer) && !app.plane;
+    scale.hidden = !app.falseColours && !shared.isolines.value && !isError(app.layer) && !app.measuring.plane;
     for (const [input, end] of [[low, 'Lower'], [high, 'Upper']] as const) input.setAttribute('aria-label', `${end} end of the scale, ${unitOf(app.layer)}`);
     unit.textContent = unitOf(app.layer);
     for (const [input, value] of [[low, app.exposure.range[0]], [high, app.exposure.range[1]]] as const) {

@@ -152,11 +152,9 @@ struct Dirty<'a> {
 /// What chunks that have seen as many changes have to look at.
 pub struct Dirt<'a> {
     bodies: Vec<Dirty<'a>>,
-    before: Vec<Bounds>,
-    now: Vec<Bounds>,
-    /// Balls around where they were and are, and around where they are.
-    balls: Vec<(DVec3, f64)>,
-    balls_now: Vec<(DVec3, f64)>,
+    /// Where they were and are: a box, and the ball around it.
+    before: Vec<(Bounds, (DVec3, f64))>,
+    now: Vec<(Bounds, (DVec3, f64))>,
     /// Lowest of their ids, and how much higher the highest is.
     ids: (u32, u32),
 }
@@ -169,26 +167,22 @@ impl<'a> Dirt<'a> {
             bodies: Vec::new(),
             before: Vec::new(),
             now: Vec::new(),
-            balls: Vec::new(),
-            balls_now: Vec::new(),
             ids: (0, 0),
+        };
+        let margin = 4.0 * world.offset;
+        let around = |bounds: Bounds| {
+            let (centre, radius) = bounds.ball();
+            (bounds, (centre, radius + margin))
         };
         for change in changes {
             if dirt.bodies.iter().all(|other| other.body != change.body) {
                 let own = &world.bodies[change.body];
                 let now = own.is_present.then_some(own.bounds);
-                dirt.before.extend(change.before);
-                dirt.now.extend(now);
+                dirt.before.extend(change.before.map(around));
+                dirt.now.extend(now.map(around));
                 dirt.bodies.push(Dirty { body: change.body, own, now });
             }
         }
-        let margin = 4.0 * world.offset;
-        let ball = |bounds: &Bounds| {
-            let (centre, radius) = bounds.ball();
-            (centre, radius + margin)
-        };
-        dirt.balls = dirt.before.iter().chain(&dirt.now).map(ball).collect();
-        dirt.balls_now = dirt.now.iter().map(ball).collect();
         let low = dirt.bodies.iter().map(|dirty| dirty.own.first).min().unwrap_or(0);
         let high = dirt.bodies.iter().map(|dirty| dirty.own.dark()).max().unwrap_or(0);
         dirt.ids = (low, high - low);
@@ -198,7 +192,7 @@ impl<'a> Dirt<'a> {
     /// The directions from a place in which what has changed may be now.
     fn cones(&self, site: &Site) -> SmallVec<[Cone; 4]> {
         let mut cones = SmallVec::new();
-        for (centre, radius) in &self.balls_now {
+        for (_, (centre, radius)) in &self.now {
             let along = *centre - site.centre;
             let reach = radius + site.radius;
             if along.dot(site.normal) <= -reach {
@@ -459,11 +453,13 @@ impl Chunk {
         let (_, seed) = self.site(work.world, e);
         let sequence = Sequence::new(seed, ROWS);
         let row = self.parts(e, rays).concat();
-        for (scale, n) in [(0, near), (1, rays)] {
+        let of = |n: usize| {
             let (kept, open) = exposed(&row[..n], &sequence, work.is_dark);
-            self.scale[scale][e] = if open >= LEAST_OPEN { 1.0 / kept as f32 } else { 0.0 };
-            self.open[e] = if open >= LEAST_OPEN { 1.0 / open } else { 0.0 };
-        }
+            if open >= LEAST_OPEN { (1.0 / kept as f32, 1.0 / open) } else { (0.0, 0.0) }
+        };
+        let first = of(near);
+        let all = if rays > near { of(rays) } else { first };
+        (self.scale[0][e], self.scale[1][e], self.open[e]) = (first.0, all.0, all.1);
     }
 
     /// Sets an entry; answers whether it met a black back and does not any more, or the other way round.
@@ -583,23 +579,31 @@ impl Chunk {
         // What the first part has made rough the rest makes whole, though nothing of its own is dirty: an object that went away and
         // came back was elsewhere meanwhile, for the first part only.
         let is_rough = |e: usize| part == Part::Far && self.shadows[column].is_rough[e];
-        if !dirt.balls.iter().any(|ball| light.may_meet(self.ball, *ball)) && !(0..self.len).any(is_rough) {
+        let is_near = |region: &(Bounds, (DVec3, f64))| light.may_meet(self.ball, region);
+        if !dirt.before.iter().chain(&dirt.now).any(is_near) && !(0..self.len).any(is_rough) {
             return 0;
         }
+        let all = ((1u128 << range.end) - (1u128 << range.start)) as u64;
         let mut rays = 0;
         for e in 0..self.len {
             let (site, seed) = self.site(world, e);
             let is_rough = part == Part::Far && self.shadows[column].is_rough[e];
-            if !dirt.balls.iter().any(|ball| light.may_meet((site.centre, site.radius), *ball)) && !is_rough {
+            let mut clear = self.shadows[column].clear[e];
+            let is_near = |region: &(Bounds, (DVec3, f64))| light.may_meet((site.centre, site.radius), region);
+            let may_change = light.may_reach(&site)
+                && (clear & all != all && dirt.before.iter().any(is_near)
+                    || clear & all != 0 && dirt.now.iter().any(is_near));
+            if !may_change && !is_rough {
                 continue;
             }
             let sequence = light.sequence(seed);
-            let mut clear = self.shadows[column].clear[e];
-            for index in range.clone() {
+            for index in range.clone().filter(|_| may_change) {
                 let Some(sample) = light.sample(world, &site, (seed, &sequence), index) else { continue };
                 let bit = 1u64 << index;
                 let (origin, direction) = (sample.ray.origin.as_dvec3(), sample.ray.direction.as_dvec3());
-                let meets = |bounds: &Bounds| bounds.may_meet(origin, direction, f64::from(sample.ray.t_max), margin);
+                let meets = |(bounds, _): &(Bounds, (DVec3, f64))| {
+                    bounds.may_meet(origin, direction, f64::from(sample.ray.t_max), margin)
+                };
                 if clear & bit == 0 {
                     if dirt.before.iter().any(meets) {
                         rays += 1;
@@ -762,30 +766,34 @@ fn mean(sum: [f64; 3], n: u32) -> Bands {
 /// back counts as one that starts inside a solid where half of those that start next to it do so too: nobody sees that
 /// place. Elsewhere backs are black.
 fn exposed(row: &[u32], sequence: &Sequence, is_dark: &[bool]) -> (u32, f32) {
-    let places: Vec<(f32, f32, bool)> = row
-        .iter()
-        .enumerate()
-        .map(|(m, id)| {
-            let [_, _, x, y] = sequence.point(m as u32);
-            let (u, v) = triangle_from_square(f64::from(x), f64::from(y));
-            (u as f32, v as f32, is_dark[*id as usize])
-        })
-        .collect();
+    let is_dark: SmallVec<[bool; 256]> = row.iter().map(|id| is_dark[*id as usize]).collect();
+    let of = |axis: usize| -> SmallVec<[f32; 256]> {
+        let place = |m: u32| {
+            let [_, _, x, y] = sequence.point(m);
+            triangle_from_square(f64::from(x), f64::from(y))
+        };
+        (0..row.len() as u32).map(|m| if axis == 0 { place(m).0 } else { place(m).1 } as f32).collect()
+    };
+    let (us, vs) = (of(0), of(1));
+    let mut squares: SmallVec<[f32; 256]> = SmallVec::from_elem(0.0, row.len());
     let mut buried = 0;
-    for (m, (u, v, _)) in places.iter().enumerate().filter(|(_, place)| place.2) {
+    for m in (0..row.len()).filter(|m| is_dark[*m]) {
+        for ((square, u), v) in squares.iter_mut().zip(&us).zip(&vs) {
+            // The square of the distance on an equilateral triangle.
+            let (du, dv) = (u - us[m], v - vs[m]);
+            *square = du * du + dv * dv + du * dv;
+        }
+        squares[m] = f32::INFINITY;
         // The nearest so far, the furthest of them last.
         let mut nearest = [(f32::INFINITY, false); NEIGHBOURS];
-        for (_, (other_u, other_v, dark)) in places.iter().enumerate().filter(|(other, _)| *other != m) {
-            // The square of the distance on an equilateral triangle.
-            let (du, dv) = (other_u - u, other_v - v);
-            let square = du * du + dv * dv + du * dv;
-            if square < nearest[NEIGHBOURS - 1].0 {
+        for (square, dark) in squares.iter().zip(&is_dark) {
+            if *square < nearest[NEIGHBOURS - 1].0 {
                 let mut k = NEIGHBOURS - 1;
-                while k > 0 && square < nearest[k - 1].0 {
+                while k > 0 && *square < nearest[k - 1].0 {
                     nearest[k] = nearest[k - 1];
                     k -= 1;
                 }
-                nearest[k] = (square, *dark);
+                nearest[k] = (*square, *dark);
             }
         }
         let dark = nearest.iter().filter(|(_, dark)| *dark).count();

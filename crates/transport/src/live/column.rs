@@ -33,10 +33,20 @@ pub struct Column {
     emitters: Vec<Emitter>,
     /// Running sum of the emitters' shares of the power, ending at 1.
     cumulative: Vec<f64>,
-    /// A ball around all of them; none if one is infinitely far.
-    ball: Option<(DVec3, f64)>,
+    reach: Reach,
     /// By what the light of each lamp is multiplied.
     pub strength: Vec<Bands>,
+}
+
+/// Where the ends of shadow rays are.
+#[derive(Clone, Copy, Debug)]
+enum Reach {
+    /// In a ball.
+    Ball(DVec3, f64),
+    /// Infinitely far in one direction.
+    Towards(DVec3),
+    /// Anywhere.
+    All,
 }
 
 #[derive(Clone, Debug)]
@@ -130,8 +140,16 @@ impl Column {
                 if total > 0.0 { running / total } else { 0.0 }
             })
             .collect();
-        let ball = (is_bounded && !emitters.is_empty()).then(|| bounds.ball());
-        Column { key, emitters, cumulative, ball, strength: vec![[1.0; 3]; lamps.len()] }
+        let reach = match emitters.as_slice() {
+            [] => Reach::All,
+            [Emitter { source: Source::Point(light), .. }] if !is_bounded => Reach::Towards(-light.direction),
+            _ if !is_bounded => Reach::All,
+            _ => {
+                let (centre, radius) = bounds.ball();
+                Reach::Ball(centre, radius)
+            }
+        };
+        Column { key, emitters, cumulative, reach, strength: vec![[1.0; 3]; lamps.len()] }
     }
 
     /// Whether it gives no light.
@@ -149,9 +167,13 @@ impl Column {
         Sequence::new(seed, SHADOW ^ hash(self.key))
     }
 
-    /// Whether shadow rays from a ball may meet another; never wrong where it says no.
-    pub fn may_meet(&self, (from, start): (DVec3, f64), (centre, radius): (DVec3, f64)) -> bool {
-        let Some((light, own)) = self.ball else { return true };
+    /// Whether shadow rays from a ball may meet what is in a box and in the ball around it; never wrong where it says no.
+    pub fn may_meet(&self, (from, start): (DVec3, f64), (bounds, (centre, radius)): &(Bounds, (DVec3, f64))) -> bool {
+        let (light, own) = match self.reach {
+            Reach::All => return true,
+            Reach::Towards(direction) => return bounds.may_meet(from, direction, f64::INFINITY, start),
+            Reach::Ball(light, own) => (light, own),
+        };
         let along = light - from;
         let length = along.length();
         // The hull of two balls is a ball that grows from one to the other; where it comes nearest to a point lies a little
@@ -160,12 +182,22 @@ impl Column {
         if slope.is_nan() || slope.abs() >= 1.0 {
             return true;
         }
-        let away = centre - from;
+        let away = *centre - from;
         let foot = away.dot(along) / length;
         let height = (away.length_squared() - foot * foot).max(0.0).sqrt();
         let share = ((foot + height * slope / (1.0 - slope * slope).sqrt()) / length).clamp(0.0, 1.0);
         let width = start + share * (own - start);
-        (from + share * along).distance(centre) <= 1.001 * (radius + width)
+        (from + share * along).distance(*centre) <= 1.001 * (radius + width)
+            && bounds.may_meet(from, along / length, length, 1.001 * start.max(own))
+    }
+
+    /// Whether it may shine on the front of an element; never wrong where it says no.
+    pub fn may_reach(&self, site: &Site) -> bool {
+        match self.reach {
+            Reach::All => true,
+            Reach::Towards(direction) => direction.dot(site.normal) > 0.0,
+            Reach::Ball(light, own) => (light - site.centre).dot(site.normal) > -1.001 * own,
+        }
     }
 
     /// Shadow ray `index` of an element; none where nothing can arrive.
