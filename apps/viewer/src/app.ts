@@ -188,6 +188,9 @@ export class App {
       case 'plane':
         this.measuring.hearPlane(notice.question, notice.answer, notice.why);
         break;
+      case 'survey':
+        this.measuring.hearSurvey(notice.question, notice);
+        break;
       case 'in_sight':
         this.sight.hear(notice.question, notice.error);
         break;
@@ -208,7 +211,7 @@ export class App {
     this.isCaughtUp = true;
     this.opened ??= performance.now();
     if (this.selected === null) this.navigator.choose();
-    this.measuring.planes.begin();
+    this.measuring.begin();
     this.tell('view');
     this.tell('connection');
   }

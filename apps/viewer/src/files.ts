@@ -6,11 +6,10 @@ import { measured } from './plane';
 /** Hands the points of the grid or of the plane to the person: with normals, as `radiosity measure` reads points. */
 export function savePoints(app: App): void {
   const { measuring: { grid, plane }, stage } = app;
-  const normal = grid && stage.toScene(grid.normal);
   const [u, v] = plane?.answer?.axes ?? [[], []];
-  const up = normal?.toArray() ?? [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  const up = grid ? (grid.answer?.normal ?? stage.toScene(grid.normal).toArray()) : [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
   const row = ({ point, lux }: ReturnType<typeof measured>[number]) =>
-    [...stage.toScene(point).toArray().map((x) => x.toFixed(5)), ...up.map((x) => x.toFixed(6)), lux.toPrecision(6)].join(',');
+    [...stage.toScene(point).toArray().map((x) => Number(x.toPrecision(9))), ...up.map((x) => x.toFixed(6)), lux.toPrecision(6)].join(',');
   const read = grid && app.layer;
   const column = read === 'relative_error' ? 'relative_error_percent' : read === 'error' ? 'standard_error_lux' : 'illuminance_lux';
   const rows = [`x,y,z,nx,ny,nz,${column}`, ...measured(app).map(row), ''];

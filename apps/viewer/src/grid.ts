@@ -5,14 +5,17 @@ import { DataUtils, DoubleSide, Ray, Vector3 } from 'three';
 import { luminance } from './luminance';
 import { barycentric, corners, type Hit } from './stage';
 import { UNIT, type Surface } from './surface';
+import type { SurveyAnswer } from './wire';
 
 /** A point of a grid, and where on the surface it is: weights of the triangle's corners 1 and 2. */
 export interface GridPoint {
   point: Vector3;
   triangle: number;
   uv: [number, number];
-  /** Of the layer that is shown. */
+  /** Of all light as it was measured there, or of another layer as it is shown. */
   lux: number;
+  /** What was measured there last; none before. */
+  measured: number | null;
   /** Whether it lies beneath something: it does not count then. */
   isCovered: boolean;
 }
@@ -35,6 +38,10 @@ export interface Grid {
   largest: number;
   /** Least over mean. */
   uniformity: number;
+  /** Of what was measured last. */
+  answer: SurveyAnswer | null;
+  /** The points that are being measured. */
+  asked: GridPoint[];
 }
 
 /** Farthest from the plane of the picked triangle, as a share of the size; and by how much normals may differ. */
@@ -44,8 +51,8 @@ const PARALLEL = 0.9995;
 /** The largest cell of the standard, metres. */
 const LARGEST = 10;
 
-/** Most points: more are too many to draw and to read. */
-const MOST = 10_000;
+/** Most points: more are too many to draw and to read, and take seconds to measure. */
+const MOST = 4000;
 
 /** How many cells a surface with these sides has each way. */
 export function cells(size: [number, number]): [number, number] {
@@ -132,12 +139,12 @@ export function lay({ surface, triangle, uv }: Hit): Grid | null {
       const at = origin.clone().addScaledVector(u, low[0] + (i + 0.5) * cell[0]).addScaledVector(v, low[1] + (j + 0.5) * cell[1]);
       const ray = new Ray(at.clone().addScaledVector(normal, 2 * thick), normal.clone().negate()).applyMatrix4(inverse);
       const hit = surface.tree.raycast(ray, DoubleSide).find(({ faceIndex }) => own.has(faceIndex!));
-      if (hit) points.push({ point: at, triangle: hit.faceIndex!, uv: barycentric(surface, hit.faceIndex!, hit.point), lux: 0, isCovered: false });
+      if (hit) points.push({ point: at, triangle: hit.faceIndex!, uv: barycentric(surface, hit.faceIndex!, hit.point), lux: 0, measured: null, isCovered: false });
     }
   }
   if (points.length === 0) return null;
   const picked = { triangle, uv };
-  const grid: Grid = { surface, picked, points, size, cell, isCoarse, normal, least: 0, mean: 0, largest: 0, uniformity: 0 };
+  const grid: Grid = { surface, picked, points, size, cell, isCoarse, normal, least: 0, mean: 0, largest: 0, uniformity: 0, answer: null, asked: [] };
   return grid;
 }
 
@@ -170,10 +177,10 @@ export function open({ points }: Grid): GridPoint[] {
   return points.filter((point) => !point.isCovered);
 }
 
-/** Reads a grid in the light that is shown now. */
-export function read(grid: Grid): void {
+/** Reads a grid: what was measured, or of a layer that is no whole light, and before anything is measured, what is shown. */
+export function read(grid: Grid, isWhole: boolean): void {
   const lux = open(grid).map((point) => {
-    point.lux = luxAt(grid.surface, point.triangle, point.uv);
+    point.lux = (isWhole ? point.measured : null) ?? luxAt(grid.surface, point.triangle, point.uv);
     return point.lux;
   });
   grid.mean = lux.reduce((a, b) => a + b, 0) / Math.max(1, lux.length);

@@ -2,10 +2,10 @@
 import type { App } from './app';
 import { cover } from './cover';
 import { follow, lay, open, read, type Grid } from './grid';
-import { BORDER, HEIGHT, PlaneAsker, type WorkingPlane } from './plane';
+import { Asker, BORDER, HEIGHT, type WorkingPlane } from './plane';
 import { corners, type Hit } from './stage';
 import type { Surface } from './surface';
-import type { PlaneAnswer, ProbeAnswer } from './wire';
+import type { PlaneAnswer, ProbeAnswer, SurveyAnswer } from './wire';
 
 /** What was measured at a point, and where it is. */
 export interface Probed {
@@ -21,7 +21,7 @@ export class Measuring {
   plane: WorkingPlane | null = null;
   planeHeight = HEIGHT;
   planeBorder = BORDER;
-  readonly planes: PlaneAsker;
+  private asker: Asker;
   private question = 0;
   /** Of which light was asked last. */
   private asked = '';
@@ -29,7 +29,7 @@ export class Measuring {
   private gridMoves = 0;
 
   constructor(private app: App) {
-    this.planes = new PlaneAsker(app);
+    this.asker = new Asker(app);
   }
 
   // What the server says.
@@ -45,7 +45,19 @@ export class Measuring {
   }
 
   hearPlane(question: number, answer: PlaneAnswer | null, why: string | null): void {
-    if (this.planes.hear(question)) this.tellPlane(answer, why);
+    if (this.asker.hear(question)) this.tellPlane(answer, why);
+  }
+
+  hearSurvey(question: number, answer: SurveyAnswer): void {
+    if (!this.asker.hear(question) || !this.grid) return;
+    this.grid.asked.forEach((point, i) => { point.measured = answer.lux[i]; });
+    this.grid.answer = answer;
+    this.readGrid();
+  }
+
+  /** All is there again after the connection was lost. */
+  begin(): void {
+    this.asker.begin();
   }
 
   /** What was laid on an object, before the connection was lost, lies on the new surface of it. */
@@ -69,7 +81,7 @@ export class Measuring {
     this.asked = light;
     this.askProbe();
     if (this.grid) this.readGrid();
-    this.planes.ask();
+    this.asker.ask();
   }
 
   // What a person does.
@@ -131,6 +143,7 @@ export class Measuring {
     this.gridMoves = -1;
     if (!this.grid) this.app.say('There is no plane surface to lay a grid over.');
     this.readGrid();
+    this.asker.begin();
     this.app.tell('grid');
     this.app.tell('view');
   }
@@ -142,7 +155,7 @@ export class Measuring {
     this.app.say('');
     const { surface, triangle, uv } = this.probed.hit;
     this.plane = { surface, triangle, uv, height: this.planeHeight, border: this.planeBorder, answer: null };
-    this.planes.begin();
+    this.asker.begin();
     this.app.tell('grid');
   }
 
@@ -153,7 +166,7 @@ export class Measuring {
       // Numbers of the old plane would be taken for those of this one.
       Object.assign(this.plane, { height, border, answer: null });
       this.app.marks.plane(null);
-      this.planes.begin();
+      this.asker.begin();
     }
     this.app.tell('grid');
     this.app.tell('view');
@@ -181,7 +194,7 @@ export class Measuring {
       this.app.say('All points of the grid lie beneath things.');
       return this.clearGrid();
     }
-    if (this.grid) read(this.grid);
+    if (this.grid) read(this.grid, this.app.layer === 'total');
     this.app.marks.grid(this.grid);
     this.app.tell('grid');
   }

@@ -1,5 +1,5 @@
-// A working plane above a picked floor: the server measures it, as its points lie in the air. It is measured again when light
-// changes, and says so while what it tells is older than what is seen.
+// A working plane above a picked floor, or a grid over a surface: the server measures them, with rays of each point. They are
+// measured again when light changes, and say so while what they tell is older than what is seen.
 import type { Vector3 } from 'three';
 import type { App } from './app';
 import { open } from './grid';
@@ -23,8 +23,8 @@ export interface WorkingPlane {
   answer: PlaneAnswer | null;
 }
 
-/** Asks for the plane that is laid, one question at a time. */
-export class PlaneAsker {
+/** Asks for the plane or the grid that is laid, one question at a time. */
+export class Asker {
   private question = 0;
   private isWaiting = false;
   /** Whether light has changed since the question. */
@@ -32,7 +32,7 @@ export class PlaneAsker {
 
   constructor(private app: App) {}
 
-  /** Asks for another plane, whatever was asked before. */
+  /** Asks for another plane or grid, whatever was asked before. */
   begin(): void {
     this.isWaiting = false;
     this.ask();
@@ -40,12 +40,19 @@ export class PlaneAsker {
 
   /** Asks again, at once or after the answer that is awaited. */
   ask(): void {
-    const { measuring: { plane }, connection } = this.app;
     this.isDue = this.isWaiting;
-    if (!plane || this.isWaiting) return;
-    this.question += 1;
-    const { surface: { object }, triangle, uv, height, border } = plane;
-    this.isWaiting = connection.send({ kind: 'plane', question: this.question, about: { object, triangle, uv, height, border } });
+    if (this.isWaiting) return;
+    const { measuring: { plane, grid }, connection, layer } = this.app;
+    if (plane) {
+      const { surface: { object }, triangle, uv, height, border } = plane;
+      this.question += 1;
+      this.isWaiting = connection.send({ kind: 'plane', question: this.question, about: { object, triangle, uv, height, border } });
+    } else if (grid && layer === 'total') {
+      grid.asked = open(grid);
+      const places = grid.asked.map(({ triangle, uv: [v, w] }): [number, number, number] => [triangle, Number(v.toFixed(6)), Number(w.toFixed(6))]);
+      this.question += 1;
+      this.isWaiting = connection.send({ kind: 'survey', question: this.question, object: grid.surface.object, places });
+    }
   }
 
   /** Whether an answer is that to the last question. */
@@ -57,12 +64,13 @@ export class PlaneAsker {
   }
 }
 
-/** Whether a plane tells of light that still changes, or of a scene before the last change; else nothing. */
-export function lateness({ measuring: { plane }, status }: App): string {
-  if (!plane) return '';
-  if (!plane.answer) return 'Measuring …';
-  if (status && plane.answer.edits !== status.edits) return 'The numbers are those before the last change; new ones are on their way.';
-  return plane.answer.is_done ? '' : 'The light still gets finer; the numbers follow.';
+/** Whether a plane or a grid tells of light that still changes, or of a scene before the last change; else nothing. */
+export function lateness({ measuring: { plane, grid }, status, layer }: App): string {
+  if (!plane && (!grid || layer !== 'total')) return '';
+  const answer = plane ? plane.answer : grid!.answer;
+  if (!answer) return 'Measuring …';
+  if (status && answer.edits !== status.edits) return 'The numbers are those before the last change; new ones are on their way.';
+  return answer.is_done ? '' : 'The light still gets finer; the numbers follow.';
 }
 
 /** The points that are written on the picture and saved: of the plane or of the grid. */

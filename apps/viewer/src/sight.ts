@@ -1,12 +1,12 @@
-// How far the light in sight is known: the error of all light together is that of its brightest part, a lawn in the sun, and says
-// nothing of a room. The server tells it for the camera, which it is asked about when the camera rests or the light is another.
+// How far the picture is off: the noise of all light together is that of its brightest part, a lawn in the sun, and knows nothing of
+// edges of shadows. The server measures at places in sight, when the camera rests or the light is another.
 import type { App } from './app';
 
 /** Milliseconds between looks. */
 const EVERY = 300;
 
 export class Sight {
-  /** Mean relative error of the light in sight; none while it is not known. */
+  /** Relative error of what is shown in sight; none while it is not known. */
   error: number | null = null;
   private question = 0;
   /** From where it was asked, and of which light. */

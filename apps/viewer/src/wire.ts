@@ -146,6 +146,20 @@ export interface PlaneAnswer {
   is_done: boolean;
 }
 
+/** What was measured at the places of a grid. */
+export interface SurveyAnswer {
+  /** Illuminance at each place, lx; none where there is no such place any more. */
+  lux: (number | null)[];
+  /** Unit normal of the places, in the scene's axes. */
+  normal: [number, number, number] | null;
+  /** Standard error of a place by its rays, over the mean. */
+  error: number;
+  /** Edits that are in it. */
+  edits: number;
+  /** Whether the light will stay as it is. */
+  is_done: boolean;
+}
+
 /** What was refused: a change of the scene, a camera to keep, to follow changes in the layer that is shown, or a message
  *  that is none. The message is for people. */
 export interface RefusedNotice {
@@ -165,6 +179,7 @@ export type Notice =
   | { kind: 'caught_up' }
   | { kind: 'probe'; question: number; answer: ProbeAnswer | null }
   | { kind: 'plane'; question: number; answer: PlaneAnswer | null; why: string | null }
+  | ({ kind: 'survey'; question: number } & SurveyAnswer)
   | { kind: 'in_sight'; question: number; error: number | null }
   | { kind: 'rays'; question: number; rays: number[][][] }
   | RefusedNotice;
@@ -219,6 +234,7 @@ export type Request =
   | { kind: 'layer'; layer: Layer; epoch: number }
   | { kind: 'probe'; question: number; object: number; triangle: number; uv: [number, number] }
   | { kind: 'plane'; question: number; about: { object: number; triangle: number; uv: [number, number]; height: number; border: number } }
+  | { kind: 'survey'; question: number; object: number; places: [number, number, number][] }
   | { kind: 'in_sight'; question: number; matrix: number[]; fov: number; aspect: number }
   | { kind: 'rays'; question: number; object: number; triangle: number }
   | { kind: 'bookmark'; camera: CameraPlace }

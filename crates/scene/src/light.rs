@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// The kinds of lights without area.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PointLightKind {
     /// Shines equally in all directions; intensity in candela.
     Point,

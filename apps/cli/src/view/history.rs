@@ -86,6 +86,15 @@ pub enum Target {
     NewLight,
 }
 
+/// Whether an edit adds anything: then it is outdated by no other.
+pub fn adds(edit: &Edit) -> bool {
+    match edit {
+        Edit::Add { .. } | Edit::AddLight { .. } | Edit::Copy { .. } | Edit::CopyLight { .. } => true,
+        Edit::Several(edits) => edits.iter().any(adds),
+        _ => false,
+    }
+}
+
 /// Everything that an edit acts on, in order.
 pub fn targets(edit: &Edit) -> Vec<Target> {
     match edit {

@@ -4,7 +4,8 @@ use super::board::{Board, Notice, Subject};
 use super::history::{self, Gesture, History, targets};
 use super::wire::{self, CameraPlace, PlaneAnswer, ProbeAnswer, Refused, Request, Say, Share};
 use radiosity::session::{
-    Edit, EditError, Layer, LightKind, Model, ObjectId, Plane, PlaneError, PlaneReading, Probe, Session,
+    Edit, EditError, Layer, LightKind, Model, ObjectId, Plane, PlaneError, PlaneReading, Probe, Reading, Session,
+    SurfacePlace, Survey, Surveyed,
 };
 use radiosity::{Bands, Scene, luminance};
 use std::collections::BTreeSet;
@@ -77,8 +78,8 @@ pub struct Solver {
     /// would be seen before the gesture ends.
     held: Option<(Command, Instant)>,
     latency: Option<f64>,
-    /// Planes that pages wait for, one of each page at most.
-    planes: Vec<Asked>,
+    /// What pages wait for that takes its time: of each page one of a kind at most.
+    measured: Vec<Asked>,
     /// Since when rays have been traced without a change, and how many there were.
     since: (Instant, u32),
     /// Since when all rays have been there but for what edits have changed; none before.
@@ -87,12 +88,28 @@ pub struct Solver {
     settled: Option<f64>,
 }
 
-/// A plane that a page waits for.
+/// What a page waits for.
 struct Asked {
     page: u64,
     question: u64,
-    plane: Plane,
+    what: Measured,
     answer: mpsc::Sender<String>,
+}
+
+/// What is measured at many points.
+enum Measured {
+    Plane(Plane),
+    /// A grid over a surface.
+    Places(Survey),
+    /// Places all over what a camera sees.
+    Sight(Survey),
+}
+
+impl Measured {
+    /// A page looks from one place, and has one grid or plane.
+    fn is_sight(&self) -> bool {
+        matches!(self, Measured::Sight(_))
+    }
 }
 
 impl Asked {
@@ -115,10 +132,7 @@ struct Shown {
 fn gesture(command: &Command) -> Option<(u64, u64, Vec<history::Target>)> {
     match command {
         Command::Ask { page, request: Request::Edit { edit, gesture: Some(gesture) }, .. } => {
-            let of = targets(edit);
-            // What adds something is never outdated.
-            let adds = of.iter().any(|target| matches!(target, history::Target::NewObject | history::Target::NewLight));
-            (!adds).then_some((*page, *gesture, of))
+            (!history::adds(edit)).then(|| (*page, *gesture, targets(edit)))
         }
         _ => None,
     }
@@ -142,7 +156,7 @@ impl Solver {
             edited: None,
             held: None,
             latency: None,
-            planes: Vec::new(),
+            measured: Vec::new(),
             since: (Instant::now(), 0),
             settling: None,
             settled: None,
@@ -156,7 +170,7 @@ impl Solver {
     pub fn run(mut self, mut commands: mpsc::Receiver<Command>) {
         loop {
             let mut waiting: Vec<Command> = Vec::new();
-            if self.is_done && self.held.is_none() && self.planes.is_empty() {
+            if self.is_done && self.held.is_none() && self.measured.is_empty() {
                 match commands.blocking_recv() {
                     Some(command) => waiting.push(command),
                     None => return,
@@ -175,7 +189,7 @@ impl Solver {
             }
             self.turn();
             // Nothing wakes this thread when a page reads its answers.
-            let is_stuck = !self.planes.is_empty() && self.planes.iter().all(Asked::is_full);
+            let is_stuck = !self.measured.is_empty() && self.measured.iter().all(Asked::is_full);
             if is_stuck && self.is_done && self.held.is_none() {
                 std::thread::sleep(SLICE);
             }
@@ -206,8 +220,16 @@ impl Solver {
     fn obey(&mut self, command: Command, since: Instant) -> bool {
         match command {
             Command::Ask { page, request: Request::Plane { question, about }, answer } => {
-                self.planes.retain(|asked| asked.page != page);
-                self.planes.push(Asked { page, question, plane: Plane::new(about), answer });
+                self.ask(Asked { page, question, what: Measured::Plane(Plane::new(about)), answer });
+            }
+            Command::Ask { page, request: Request::Survey { question, object, places }, answer } => {
+                let place = |(triangle, v, w)| SurfacePlace { object, triangle, uv: [v, w] };
+                let survey = Survey::new(places.into_iter().map(place).collect());
+                self.ask(Asked { page, question, what: Measured::Places(survey), answer });
+            }
+            Command::Ask { page, request: Request::InSight { question, matrix, fov, aspect }, answer } => {
+                let survey = Survey::new(self.session.places_in_sight(&matrix, fov, aspect));
+                self.ask(Asked { page, question, what: Measured::Sight(survey), answer });
             }
             Command::Ask { page, request, answer } => {
                 if let Some(text) = self.answer(page, &request, since) {
@@ -225,6 +247,12 @@ impl Solver {
         true
     }
 
+    /// In place of what the page asked of that kind before.
+    fn ask(&mut self, asked: Asked) {
+        self.measured.retain(|other| other.page != asked.page || other.what.is_sight() != asked.what.is_sight());
+        self.measured.push(asked);
+    }
+
     fn answer(&mut self, page: u64, request: &Request, since: Instant) -> Option<String> {
         match request {
             Request::Edit { edit, gesture } => match self.apply(edit, since) {
@@ -236,8 +264,8 @@ impl Solver {
                 }
                 Err(error) => Some(unchanged(&error, &self.model)),
             },
-            Request::Undo | Request::Redo => {
-                let is_undo = *request == Request::Undo;
+            Request::Undo {} | Request::Redo {} => {
+                let is_undo = *request == Request::Undo {};
                 let next = if is_undo { self.history.next_undo() } else { self.history.next_redo() };
                 let edit = next?.clone();
                 match self.apply(&edit, since) {
@@ -248,16 +276,14 @@ impl Solver {
                 self.post_history();
                 None
             }
-            // The board keeps who looks at what, and planes wait until there is time.
-            Request::Layer { .. } | Request::Plane { .. } => None,
+            // The board keeps who looks at what, and what is measured waits until there is time.
+            Request::Layer { .. } | Request::Plane { .. } | Request::Survey { .. } | Request::InSight { .. } => None,
             Request::Probe { question, object, triangle, uv } => {
                 let is_place = uv.iter().all(|x| x.is_finite());
                 let probe = self.session.probe(*object, *triangle, *uv).filter(|_| is_place);
-                Some(Say::Probe { question: *question, answer: probe.map(|probe| self.read(&probe)) }.text())
-            }
-            Request::InSight { question, matrix, fov, aspect } => {
-                let error = self.session.error_in_sight(matrix, *fov, *aspect);
-                Some(Say::InSight { question: *question, error }.text())
+                let mut here = Survey::new(vec![SurfacePlace { object: *object, triangle: *triangle, uv: *uv }]);
+                let here = self.session.survey(&mut here, Duration::ZERO).and_then(|found| found.readings[0]);
+                Some(Say::Probe { question: *question, answer: probe.map(|probe| self.read(&probe, here)) }.text())
             }
             Request::Rays { question, object, triangle } => {
                 Some(Say::Rays { question: *question, rays: self.session.rays(*object, *triangle) }.text())
@@ -301,13 +327,13 @@ impl Solver {
         None
     }
 
-    /// Works for a slice. Planes wait while an edit is not seen; else they have half of it, or all that light leaves.
+    /// Works for a slice. What is measured waits while an edit is not seen; else it has half of it, or all that light leaves.
     fn turn(&mut self) {
         let started = Instant::now();
-        let has_planes = self.edited.is_none() && !self.planes.iter().all(Asked::is_full);
-        self.work(if has_planes { SLICE / 2 } else { SLICE });
+        let has_questions = self.edited.is_none() && !self.measured.iter().all(Asked::is_full);
+        self.work(if has_questions { SLICE / 2 } else { SLICE });
         if self.edited.is_none() {
-            self.measure_planes(started + SLICE);
+            self.measure(started + SLICE);
         }
     }
 
@@ -467,7 +493,7 @@ impl Solver {
     }
 
     /// A probe as people read it.
-    fn read(&self, probe: &Probe) -> ProbeAnswer {
+    fn read(&self, probe: &Probe, here: Option<Reading>) -> ProbeAnswer {
         let share = |bands: Bands| if probe.lux > 0.0 { luminance(bands) / probe.lux } else { 0.0 };
         let light = |id: radiosity::session::LightId| {
             let found = self.model.lights.iter().find(|light| light.id == id);
@@ -490,33 +516,65 @@ impl Solver {
         if !lights.is_empty() && rest > LEAST_TOLD {
             lights.push(Share { name: "not told apart yet".to_owned(), share: rest });
         }
+        // Shares are those of the element; how much it is, is measured at the place itself.
+        let irradiance = here.map_or(probe.irradiance, |here| here.irradiance);
+        let more = |band: usize| probe.reflectance[band] * (irradiance[band] - probe.irradiance[band]);
         ProbeAnswer {
-            illuminance: probe.lux,
-            irradiance: probe.irradiance,
+            illuminance: luminance(irradiance),
+            irradiance,
             reflectance: probe.reflectance,
-            radiosity: probe.radiosity,
+            radiosity: std::array::from_fn(|band| (probe.radiosity[band] + more(band)).max(0.0)),
             lights,
             surfaces: shares(std::iter::once(straight).chain(surfaces)),
         }
     }
 
-    /// Works on planes that pages wait for until a time, at least on a few points.
-    fn measure_planes(&mut self, until: Instant) {
-        self.planes.retain(|asked| !asked.answer.is_closed());
-        while let Some(next) = self.planes.iter().position(|asked| !asked.is_full()) {
+    /// Works on what pages wait for until a time, at least on a few points.
+    fn measure(&mut self, until: Instant) {
+        self.measured.retain(|asked| !asked.answer.is_closed());
+        while let Some(next) = self.measured.iter().position(|asked| !asked.is_full()) {
             let left = until.saturating_duration_since(Instant::now());
-            let measured = self.session.measure_plane(&mut self.planes[next].plane, left);
-            let Some(measured) = measured.transpose() else { return };
-            let asked = self.planes.remove(next);
-            let text = self.tell_plane(asked.question, measured);
-            // A page asks no other plane before it has this one.
+            let question = self.measured[next].question;
+            let text = match &mut self.measured[next].what {
+                Measured::Plane(plane) => {
+                    let measured = self.session.measure_plane(plane, left).transpose();
+                    measured.map(|measured| self.tell_plane(question, measured))
+                }
+                Measured::Places(survey) => {
+                    let surveyed = self.session.survey(survey, left);
+                    surveyed.map(|surveyed| self.tell_survey(question, &surveyed))
+                }
+                Measured::Sight(survey) => {
+                    let surveyed = self.session.survey(survey, left);
+                    surveyed.map(|surveyed| Say::InSight { question, error: surveyed.off }.text())
+                }
+            };
+            let Some(text) = text else { return };
+            let asked = self.measured.remove(next);
+            // A page asks nothing else of the kind before it has this.
             if let Err(TrySendError::Full(_)) = asked.answer.try_send(text) {
-                self.planes.push(asked);
+                self.measured.push(asked);
             }
             if left.is_zero() {
                 return;
             }
         }
+    }
+
+    fn tell_survey(&self, question: u64, surveyed: &Surveyed) -> String {
+        let there: Vec<&Reading> = surveyed.readings.iter().flatten().collect();
+        let mean = there.iter().map(|reading| f64::from(reading.lux)).sum::<f64>() / there.len().max(1) as f64;
+        let square = there.iter().map(|reading| f64::from(reading.error).powi(2)).sum::<f64>();
+        let error = (square / there.len().max(1) as f64).sqrt();
+        Say::Survey {
+            question,
+            lux: surveyed.readings.iter().map(|reading| reading.map(|reading| reading.lux)).collect(),
+            normal: there.first().map(|reading| reading.normal),
+            error: if mean > 0.0 { (error / mean) as f32 } else { 0.0 },
+            edits: self.edits,
+            is_done: self.is_done,
+        }
+        .text()
     }
 
     fn tell_plane(&self, question: u64, measured: Result<PlaneReading, PlaneError>) -> String {
@@ -608,6 +666,6 @@ mod tests {
             unread.try_recv().ok()
         });
         assert!(told.is_some_and(|text| is_answer(&text, 7)));
-        assert!(solver.planes.is_empty());
+        assert!(solver.measured.is_empty());
     }
 }

@@ -50,8 +50,8 @@ pub enum Request {
         #[serde(default)]
         gesture: Option<u64>,
     },
-    Undo,
-    Redo,
+    Undo {},
+    Redo {},
     /// Looks at another layer of light.
     Layer {
         layer: Layer,
@@ -69,7 +69,13 @@ pub enum Request {
         question: u64,
         about: PlaneQuestion,
     },
-    /// Asks how far the light is known that is seen from a place.
+    /// Measures at places of one object: triangle, and weights of its corners 1 and 2. In place of a plane.
+    Survey {
+        question: u64,
+        object: ObjectId,
+        places: Vec<(u32, f32, f32)>,
+    },
+    /// Asks how far the picture is off that is seen from a place. Of several that a page asks for, the last is answered.
     InSight {
         question: u64,
         /// World from camera, by columns.
@@ -168,9 +174,22 @@ pub enum Say<'a> {
         answer: Option<PlaneAnswer>,
         why: Option<String>,
     },
+    Survey {
+        question: u64,
+        /// Illuminance at each place, lx; none where there is no such place any more.
+        lux: Vec<Option<f32>>,
+        /// Unit normal of the places, in the scene's axes.
+        normal: Option<[f64; 3]>,
+        /// One standard error of a place, in the root mean square, over the mean.
+        error: f32,
+        /// Edits that are in it.
+        edits: u64,
+        /// Whether the light will stay as it is.
+        is_done: bool,
+    },
     InSight {
         question: u64,
-        /// Mean relative error of the light in sight; none while it is not known.
+        /// How far what is shown is off there, over the light; none where there is none.
         error: Option<f64>,
     },
     Rays {
@@ -448,7 +467,7 @@ mod tests {
     fn what_is_no_request_is_refused() {
         let edit = r#"{"kind":"edit","edit":{"light":{"light":0,"dimming":0.5,"colour":[1,1,1]}},"gesture":3}"#;
         assert!(serde_json::from_str::<Request>(edit).is_ok());
-        assert_eq!(serde_json::from_str::<Request>(r#"{"kind":"undo"}"#).unwrap(), Request::Undo);
+        assert_eq!(serde_json::from_str::<Request>(r#"{"kind":"undo"}"#).unwrap(), Request::Undo {});
         let spot = r#"{"kind":{"spot":{"inner":0.3,"outer":0.6}},"position":[0,2,0],"direction":[0,-1,0],"intensity":[9,9,9]}"#;
         let matrix = "[1,0,0,0,0,1,0,0,0,0,1,0,0.5,0,0,1]";
         for right in [
@@ -478,6 +497,11 @@ mod tests {
             r#"{"kind":"edit","edit":{"change_light":{"light":3,"kind":"point","intensity":[9,9]}}}"#,
             r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1]}"#,
             r#"{"kind":"probe","question":1,"object":0,"triangle":0,"uv":[0.1,0.2],"extra":1}"#,
+            r#"{"kind":"undo","extra":1}"#,
+            r#"{"kind":"survey","question":1,"object":0,"places":[[1,0.1]]}"#,
+            r#"{"kind":"edit","edit":{"light":{"light":0,"dimming":0.5,"colour":[1,1,1],"extra":1}}}"#,
+            r#"{"kind":"edit","edit":{"delete":{"object":0,"extra":1}}}"#,
+            r#"{"kind":"edit","edit":{"change_light":{"light":3,"kind":{"spot":{"inner":0.3,"outer":0.6,"x":1}},"intensity":[9,9,9]}}}"#,
             &deep,
         ] {
             assert!(serde_json::from_str::<Request>(wrong).is_err(), "{}", &wrong[..wrong.len().min(80)]);

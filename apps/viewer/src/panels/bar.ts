@@ -7,8 +7,8 @@ import { button, choice, el } from './parts';
 export function bar(app: App, { help, fold }: { help(): void; fold(): void }): HTMLElement {
   const title = el('b', { class: 'scene' });
   const progress = el('i', { class: 'progress', role: 'progressbar', 'aria-label': 'Solution', 'aria-valuemin': 0, 'aria-valuemax': 100 });
-  const sight = el('span', { id: 'in-sight', title: 'Estimated error of the illuminance in sight: one standard error over the light there, in the mean over the picture' });
-  const error = el('span', { class: 'wide', id: 'error', title: 'Estimated relative error of all light together (L2): that of the brightest surfaces' });
+  const sight = el('span', { id: 'in-sight', title: 'How far the picture is off in sight, edges of shadows and all: measured at 160 places with rays of their own, over the light there, root mean square. The light meter and grids measure at their own points and are as exact as those' });
+  const error = el('span', { class: 'wide', id: 'error', title: 'Noise of the rays of all light together (L2); that elements have a size is not in it' });
   const rays = el('span', { class: 'wide', id: 'rays' });
   const left = el('span', { class: 'wide', id: 'left' });
   const mode = choice('How to move', [['walk', 'Walk', 'V'], ['orbit', 'Orbit', 'V']], (value) => app.walk(value));
@@ -80,8 +80,8 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     progress.classList.toggle('done', status.is_done);
     rays.textContent = `${status.rays} of ${status.most_rays} rays`;
     // After a change it is known again when all rays are there; the bar does not jump meanwhile.
-    const unknown = status.edits > 0 ? 'in all ± …' : 'error not known yet';
-    error.textContent = status.error === null ? unknown : `in all ± ${percent(status.error)}`;
+    const unknown = status.edits > 0 ? 'noise ± …' : 'error not known yet';
+    error.textContent = status.error === null ? unknown : `noise ± ${percent(status.error)}`;
     left.textContent = status.is_done ? `done in ${duration(status.seconds)}` : status.left === null ? '' : `${duration(status.left)} left`;
   });
   return el('header', {},

@@ -79,6 +79,7 @@ export function gridPanel(app: App): HTMLElement {
     csv.hidden = facts.hidden = !told;
     if (!told) return;
     const unit = grid ? unitOf(app.layer) : 'lx';
+    const noise = (!grid ? answer : app.layer === 'total' ? grid.answer : null)?.error;
     const { least, mean, largest, uniformity, points, covered, cell, size, isCoarse } = told;
     facts.replaceChildren(
       fact('Mean', `${readable(mean)} ${unit}`),
@@ -87,7 +88,7 @@ export function gridPanel(app: App): HTMLElement {
       fact('Uniformity', uniformity.toFixed(2)),
       fact('Points', String(grid ? points.length - covered : points.length)),
       ...(covered > 0 ? [fact('Covered, left out', String(covered))] : []),
-      ...(answer ? [fact('Noise of a point', `± ${(100 * answer.error).toPrecision(2)} %`)] : []),
+      ...(noise === undefined ? [] : [fact('Noise of a point', `± ${(100 * noise).toPrecision(2)} %`)]),
       fact('Cells', metres(cell) + (isCoarse ? ', coarser than the standard' : '')),
       fact(answer ? 'Plane' : 'Surface', metres(size)),
     );
@@ -100,7 +101,7 @@ export function gridPanel(app: App): HTMLElement {
   for (const topic of ['view', 'status'] as const) app.on(topic, () => { if (app.measuring.grid || app.measuring.plane) app.tell('grid'); });
   element.lastElementChild!.append(
     el('p', { class: 'quiet' }, 'Cells are no larger than EN 12464-1 asks. A grid stays until another is laid.'),
-    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measuring.measure(), { key: 'G', title: 'Over the whole plane that was picked, in the layer that is shown; points beneath things are left out' })),
+    el('div', { class: 'row' }, button('Lay over the picked surface', () => app.measuring.measure(), { key: 'G', title: 'Over the whole plane that was picked, each point with rays of its own; layers other than all light as they are shown. Points beneath things are left out' })),
     el('div', { class: 'row' }, button('Working plane above it', () => app.measuring.measurePlane(), { key: 'Shift+G', title: 'In the air above the picked floor, as far as the room goes; points within things are left out' })),
     field('Height above it', height), field('Left out along walls', border),
     warning, facts, el('div', { class: 'row' }, csv, clear));

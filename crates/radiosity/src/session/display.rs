@@ -159,6 +159,14 @@ impl Display {
         self.spot.iter().map(whole).collect()
     }
 
+    /// Light at a place of a triangle, given what [`Display::light`] answers.
+    pub fn at(&self, light: &[Bands], triangle: u32, [v, w]: [f32; 2]) -> Bands {
+        let corners = &self.indices[3 * triangle as usize..][..3];
+        let of = |k: usize| light.get(corners[k] as usize).copied().unwrap_or_default();
+        let [a, b, c] = [of(0), of(1), of(2)];
+        std::array::from_fn(|band| (1.0 - v - w) * a[band] + v * b[band] + w * c[band])
+    }
+
     /// Means of the elements around each spot, as far as they are not buried, and their area there.
     fn at_spots<const N: usize>(
         &self,

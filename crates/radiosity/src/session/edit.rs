@@ -42,7 +42,7 @@ pub struct NewLight {
 /// A change of the scene. Matrices are by columns and carry the object as the file places it, in world coordinates, to
 /// where it shall be: the identity is its place in the file. What was added is carried from its own axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Edit {
     /// Turns a light up or down, or puts a coloured filter before it. Traces no ray.
     Light {

@@ -46,11 +46,13 @@ mod rectangle;
 mod saved;
 mod solve;
 mod state;
+mod survey;
 
 pub use added::{Form, NewObject};
 pub use edit::{Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 pub use plane::{Plane, PlaneError, PlaneFigures, PlanePoint, PlaneQuestion, PlaneReading};
+pub use survey::{Reading, SurfacePlace, Survey, Surveyed};
 
 use crate::Error;
 use display::{Display, Weights};

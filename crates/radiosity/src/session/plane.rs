@@ -9,11 +9,12 @@
 //! Fails where walls and furniture are one object: that is a wall then. Doors wider than twice the zone let the plane through.
 
 use super::rectangle::{axes_along, cells, extent, is_within};
+use super::survey::Meter;
 use super::{ObjectId, Session};
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::live::{Bounds, Target};
+use radiosity_transport::live::Bounds;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -37,16 +38,6 @@ const AROUND: u32 = 32;
 /// Winding number from which a place is inside. Half of the sphere is that of what stands on the floor without a bottom, seen from
 /// there.
 const INSIDE: f64 = 0.4;
-
-/// Rays of a point: by default four times those of an element, as no neighbours average its noise out. In a room with daylight from
-/// one window points are off by 1 % then, under lamps by a tenth of that (test `agrees_with_measure`); half as many make it 1.6
-/// times as much.
-const RAYS: u32 = 1024;
-
-/// Shadow rays of a point, shared out among lights, and how many each has.
-const SHADOWS: u32 = 1024;
-const LEAST_SHADOWS: u32 = 16;
-const MOST_SHADOWS: u32 = 256;
 
 /// Which plane is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -210,11 +201,8 @@ impl Session {
     /// [`PlaneError`]: there is no such plane in the scene as it is now.
     pub fn measure_plane(&self, plane: &mut Plane, budget: Duration) -> Result<Option<PlaneReading>, PlaneError> {
         let deadline = Instant::now() + budget;
-        let state = &self.state;
-        if state.is_edited || state.solved_rays == 0 || state.given.len() != self.live.ids() {
-            return Ok(None);
-        }
-        if plane.layout.is_none() || plane.revision != state.revision {
+        let Some(meter) = self.meter() else { return Ok(None) };
+        if plane.layout.is_none() || plane.revision != self.state.revision {
             plane.layout = None;
             plane.cells.clear();
         }
@@ -222,15 +210,11 @@ impl Session {
             Some(layout) => layout,
             None => self.lay(&plane.question)?,
         };
-        plane.revision = state.revision;
-        let columns: Vec<(usize, Bands)> =
-            self.strands.iter().filter_map(|strand| Some((strand.column?, self.factor(strand)))).collect();
-        let shadows = (SHADOWS / columns.len().max(1) as u32).next_power_of_two().clamp(LEAST_SHADOWS, MOST_SHADOWS);
-        let target = Target { rays: RAYS, shadows };
+        plane.revision = self.state.revision;
         let (all, batch) = (layout.counts[0] * layout.counts[1], 2 * rayon::current_num_threads());
         while plane.cells.len() < all {
             let next = plane.cells.len()..all.min(plane.cells.len() + batch);
-            let look = |cell| self.look(&layout, cell, &plane.question, (&columns, target));
+            let look = |cell| self.look(&layout, cell, &plane.question, &meter);
             let looked: Vec<Cell> = next.into_par_iter().map(look).collect();
             plane.cells.extend(looked);
             if Instant::now() >= deadline {
@@ -323,13 +307,7 @@ impl Session {
     }
 
     /// What is at the middle of a cell, and the light there.
-    fn look(
-        &self,
-        layout: &Layout,
-        cell: usize,
-        question: &PlaneQuestion,
-        (columns, target): (&[(usize, Bands)], Target),
-    ) -> Cell {
+    fn look(&self, layout: &Layout, cell: usize, question: &PlaneQuestion, meter: &Meter) -> Cell {
         let world = self.live.world();
         let at = layout.middle(cell);
         if !layout.surface.iter().any(|corners| is_within(at, corners)) {
@@ -354,7 +332,7 @@ impl Session {
         if is_inside {
             return Cell::Inside;
         }
-        Cell::Free(self.live.receive((point + world.middle, layout.normal), &self.state.given, columns, target))
+        Cell::Free(self.receive(meter, point + world.middle, layout.normal))
     }
 
     /// The points that are in the room of the picked place, and what they say together.

@@ -16,10 +16,6 @@ const MOST_BOUNCES: u32 = 64;
 /// Layers that are kept, so that several pages may look at several, and bounces follow from those before them.
 const MOST_KEPT: usize = 8;
 
-/// Rays across and down a picture whose error is told: the mean over some hundred elements of a wall is off by a tenth of
-/// itself then, as each knows its own error from two numbers alone.
-const SIGHT: [u32; 2] = [48, 30];
-
 /// Luminance of the three bands of a lane.
 pub(super) fn luminance_of(lanes: &Lanes<4>) -> f32 {
     luminance([lanes.0[0], lanes.0[1], lanes.0[2]])
@@ -32,7 +28,7 @@ fn relative(error: &Lanes<4>, h: &Lanes<4>) -> f32 {
 }
 
 impl Session {
-    fn display(&self, object: usize) -> &Display {
+    pub(super) fn display(&self, object: usize) -> &Display {
         let placed = &self.objects[object];
         let world = self.live.world();
         let shape = &world.bodies[object].shape;
@@ -365,38 +361,6 @@ impl Session {
         if self.state.errors.is_empty() { self.find_errors() } else { self.state.errors.clone() }
     }
 
-    /// How far the light that a camera sees is known: one standard error by the rays of rows over the light there, in the mean
-    /// over the picture; at most 1, as where nothing is known. It does not matter how bright a place is, so that a lawn in the sun
-    /// does not speak for the room behind the window. Shadow rays and the elements' size are not in it.
-    ///
-    /// The matrix is the world from the camera, by columns, and `fov` the vertical angle of view, radians. None while the error is
-    /// not known, and where no surface that is lit is seen.
-    pub fn error_in_sight(&self, matrix: &[f64; 16], fov: f64, aspect: f64) -> Option<f64> {
-        let (world, errors) = (self.live.world(), &self.state.errors);
-        let camera = glam::DMat4::from_cols_array(matrix);
-        let eye = camera.transform_point3(glam::DVec3::ZERO) - world.middle;
-        let half = (0.5 * fov).tan();
-        let is_sound = camera.is_finite() && (0.0..1e6).contains(&half) && (1e-3..1e3).contains(&aspect);
-        if errors.is_empty() || !is_sound {
-            return None;
-        }
-        let (mut sum, mut count) = (0f64, 0u32);
-        for pixel in 0..SIGHT[0] * SIGHT[1] {
-            let at = [pixel % SIGHT[0], pixel / SIGHT[0]];
-            let [x, y] = [0, 1].map(|k| 2.0 * (f64::from(at[k]) + 0.5) / f64::from(SIGHT[k]) - 1.0);
-            let direction = camera.transform_vector3(glam::DVec3::new(x * half * aspect, y * half, -1.0));
-            let seen = world.seen(eye, direction.normalize_or_zero()).map(|id| id as usize);
-            let Some((error, h)) = seen.and_then(|id| Some((errors.get(id)?, self.state.shown.get(id)?))) else {
-                continue;
-            };
-            if luminance_of(h) > 0.0 {
-                sum += f64::from(relative(error, h)) / 100.0;
-                count += 1;
-            }
-        }
-        (count > 0).then(|| sum / f64::from(count))
-    }
-
     /// What is known of a place on an object: `triangle` counts the object's [`ModelObject::indices`] by threes, `uv` are
     /// the weights of its corners 1 and 2.
     pub fn probe(&self, object: ObjectId, triangle: u32, uv: [f32; 2]) -> Option<Probe> {
@@ -431,6 +395,7 @@ impl Session {
         let (mut unreflected, mut error) = (of(&self.state.direct), [0f32; 2]);
         if rays > 0 && self.state.given.len() == self.live.ids() && !self.state.is_edited {
             let (row, share) = chunk.row(element, rays);
+            let rays = row[0].len() + row[1].len();
             let emission = self.emission();
             for (m, other) in row.into_iter().flatten().enumerate() {
                 let given = self.state.given[*other as usize].0;

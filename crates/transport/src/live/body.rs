@@ -242,6 +242,16 @@ impl Body {
         (t, side, a + on.x * (b - a) + on.y * (c - a))
     }
 
+    /// Where a line of sight crosses the plane of an element, as [`Body::point`] takes it; none along the plane.
+    pub fn towards(&self, element: u32, from: DVec3, direction: DVec3) -> Option<[f32; 2]> {
+        let [a, b, c] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|uv| self.point(element, uv).2);
+        let normal = (b - a).cross(c - a);
+        let along = direction.dot(normal);
+        let at = from + (a - from).dot(normal) / along * direction - a;
+        let uv = DVec2::new(at.cross(c - a).dot(normal), (b - a).cross(at).dot(normal)) / normal.length_squared();
+        uv.is_finite().then(|| uv.as_vec2().to_array())
+    }
+
     /// Area of an element, m².
     pub fn area(&self, element: u32) -> f64 {
         let (t, _, _) = self.shape.place(element);

@@ -676,10 +676,11 @@ impl Chunk {
         self.shadows[column].light[e].map(|x| x * self.open[e])
     }
 
-    /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs. Of fewer than there are in the
-    /// first part as many are taken to count as in all of it.
+    /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs; of fewer entries where an edit has left
+    /// only as many. Of fewer than there are in the first part as many are taken to count as in all of it.
     #[inline(always)]
     pub fn row(&self, e: usize, rays: usize) -> ([&[u32]; 2], f32) {
+        let rays = rays.min(self.traced as usize);
         let (part, near) = (usize::from(rays > NEAR_RAYS as usize), self.traced.min(NEAR_RAYS) as usize);
         let share = self.scale[part][e];
         (self.parts(e, rays), if rays < near { share * (near as f32 / rays as f32) } else { share })

@@ -44,6 +44,7 @@ impl Live {
         self.each_chunk(differences, |chunk, differences| {
             for (e, difference) in differences.iter_mut().enumerate() {
                 let (row, share) = chunk.row(e, rays);
+                let rays = row[0].len() + row[1].len();
                 let mut sums = [[0f32; 4]; 2];
                 for (m, id) in row.into_iter().flatten().enumerate() {
                     let (sum, value) = (&mut sums[usize::from(2 * m >= rays)], &values[*id as usize].0);

@@ -1,0 +1,129 @@
+//! Light measured at places on surfaces: against closed forms, and what it says of the picture.
+
+#[path = "common/room.rs"]
+mod room;
+
+use glam::{DAffine3, DMat3, DMat4, DVec3};
+use radiosity::session::{Edit, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed};
+use radiosity::{Material, PointLight, PointLightKind, Scene};
+use room::{Furnishing, room};
+use std::time::Duration;
+
+fn finish(session: &mut Session) {
+    for _ in 0..100_000 {
+        if session.step(Duration::from_millis(3)).is_done {
+            return;
+        }
+    }
+    panic!("{:?}", session.status());
+}
+
+/// Measured in as many slices as it takes.
+fn read(session: &Session, places: Vec<SurfacePlace>) -> Surveyed {
+    let mut survey = Survey::new(places);
+    (0..100_000).find_map(|_| session.survey(&mut survey, Duration::ZERO)).expect("an end")
+}
+
+/// A black floor of 4 m × 4 m under a lamp of 1000 cd 2 m above its middle, with a sheet of 1 m × 1 m half way over a quarter of it.
+fn shaded() -> Scene {
+    let mut scene = Scene::default();
+    scene.materials.push(Material { base_color: [0.0, 0.0, 0.0, 1.0], double_sided: true, ..Material::default() });
+    let square = |half: f64, at: DVec3| {
+        [[-1., 1.], [1., 1.], [1., -1.], [-1., -1.]].map(|[x, z]| at + DVec3::new(half * x, 0.0, half * z))
+    };
+    scene.add_quad("floor", 0, square(2.0, DVec3::ZERO));
+    scene.add_quad("sheet", 0, square(0.5, DVec3::new(0.5, 1.0, 0.5)));
+    scene.lights.push(PointLight {
+        name: "lamp".to_owned(),
+        kind: PointLightKind::Point,
+        position: DVec3::new(0.0, 2.0, 0.0),
+        direction: DVec3::NEG_Y,
+        intensity: [1000.0; 3],
+        range: None,
+    });
+    scene
+}
+
+/// A place reads E = I h/d³, or nothing in the shadow, however wide the elements are, and the picture is off by just the difference.
+#[test]
+fn places_read_their_own_light() {
+    let options = SessionOptions { element_size: Some(0.5), rays: 64, ..SessionOptions::default() };
+    let mut session = Session::new(shaded(), &options).unwrap();
+    let floor = ObjectId(0);
+    let elements = session.irradiance(floor).len().max(1) as u32;
+    assert_eq!(session.survey(&mut Survey::new(Vec::new()), Duration::ZERO), None, "it is dark");
+    finish(&mut session);
+    let model = session.model();
+    let elements = elements.max(model.objects[0].indices.len() as u32 / 3);
+    let uvs = [[0.1, 0.1], [0.8, 0.1], [0.1, 0.8], [0.3, 0.3]];
+    let at = |triangle| uvs.map(|uv| SurfacePlace { object: floor, triangle, uv });
+    let surveyed = read(&session, (0..elements).flat_map(at).collect());
+    let (mut square, mut count, mut dark) = (0.0, 0, 0);
+    for reading in surveyed.readings.iter().map(|reading| reading.unwrap()) {
+        let p = DVec3::from(reading.position);
+        if reading.normal[1] < 0.0 {
+            // The underside gets none.
+            assert_eq!(reading.lux, 0.0);
+            continue;
+        }
+        assert_eq!(reading.normal, [0.0, 1.0, 0.0]);
+        // The sheet's shadow is twice as wide: 0 to 2 m.
+        let is_dark = p.x > 0.0 && p.z > 0.0;
+        let wanted = if is_dark { 0.0 } else { 2000.0 / (p - DVec3::new(0.0, 2.0, 0.0)).length().powi(3) };
+        assert!((f64::from(reading.lux) - wanted).abs() <= 1e-4 * wanted, "{} lx at {p}, {wanted} lx", reading.lux);
+        assert_eq!(reading.error, 0.0, "one lamp without area has no noise");
+        let most = reading.lux.max(reading.shown);
+        if most > 0.0 {
+            square += f64::from((reading.shown - reading.lux) / most).powi(2);
+            count += 1;
+        }
+        dark += usize::from(is_dark && reading.shown > 1.0);
+    }
+    assert!(dark > 10, "the picture's shadow has a wide edge: {dark}");
+    let off = surveyed.off.unwrap();
+    assert!((off - (square / f64::from(count)).sqrt()).abs() < 1e-6 && off > 0.2, "{off}");
+
+    session.apply(&Edit::Delete { object: floor }).unwrap();
+    let mut waiting = Survey::new(at(0).to_vec());
+    assert_eq!(session.survey(&mut waiting, Duration::ZERO), None, "the edit is not seen");
+    finish(&mut session);
+    assert_eq!(session.survey(&mut waiting, Duration::ZERO).unwrap().readings, vec![None; 4]);
+}
+
+/// Where light is even, the picture is off by next to nothing though single readings are noisy; where nothing is seen there is
+/// nothing to tell.
+#[test]
+fn the_error_in_sight_is_without_the_noise_of_its_readings() {
+    let mut scene = room(&Furnishing { tables: 0, lamps: 0, books: 0 });
+    scene.lights.clear();
+    for material in &mut scene.materials {
+        material.base_color = [0.5, 0.5, 0.5, 1.0];
+        material.emissive = [100.0 / std::f32::consts::PI; 3];
+    }
+    let options = SessionOptions { elements: 3000, rays: 1024, ..SessionOptions::default() };
+    let mut session = Session::new(scene, &options).unwrap();
+    finish(&mut session);
+    let model = session.model();
+    let [low, high] = model.bounds.map(DVec3::from);
+    let camera = |eye: DVec3, way: DVec3, up: DVec3| {
+        let back = -way.normalize();
+        let right = up.cross(back).normalize();
+        DMat4::from(DAffine3::from_mat3_translation(DMat3::from_cols(right, back.cross(right), back), eye)).to_cols_array()
+    };
+    let middle = 0.5 * (low + high);
+    let ceiling = camera(middle, DVec3::Y, DVec3::X);
+    let places = session.places_in_sight(&ceiling, 1.0, 1.0);
+    assert_eq!(places.len(), 160, "all of it is ceiling");
+    let surveyed = read(&session, places);
+    for reading in surveyed.readings.iter().map(|reading| reading.unwrap()) {
+        let p = DVec3::from(reading.position);
+        // On the line of sight, within 0.5 rad of the axis.
+        assert!((p.y - high.y).abs() < 1e-6 && (p - middle).x.abs() <= 0.547 * (p - middle).y + 1e-6, "{p}");
+        assert!((reading.lux - 200.0).abs() < 12.0, "{} lx at {p}", reading.lux);
+    }
+    assert!(surveyed.off.unwrap() < 0.02, "{:?}", surveyed.off);
+    let away = camera(high + DVec3::ONE, high - low, DVec3::X);
+    assert!(session.places_in_sight(&away, 0.5, 1.0).is_empty(), "there is nothing");
+    assert!(session.places_in_sight(&[f64::NAN; 16], 0.5, 1.0).is_empty(), "that is no camera");
+    assert_eq!(read(&session, Vec::new()).off, None);
+}
