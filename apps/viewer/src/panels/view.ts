@@ -10,8 +10,8 @@ export function layerName(app: App, layer: Layer): string {
   if (layer === 'total') return 'All light';
   if (layer === 'direct') return 'Direct light';
   if (layer === 'indirect') return 'Indirect light';
-  if (layer === 'error') return 'Error, lx';
-  if (layer === 'relative_error') return 'Error, % of the light there';
+  if (layer === 'error') return 'Noise of rays, lx';
+  if (layer === 'relative_error') return 'Noise of rays, % of the light there';
   if ('bounce' in layer) return layer.bounce === 1 ? 'First bounce' : `Bounce ${layer.bounce}`;
   const light = app.lights.get(layer.light);
   return light ? app.lightName(light) : `Light ${layer.light + 1}`;
