@@ -572,6 +572,83 @@ fn undo_restores_every_bit() {
     assert!(bits(&session)[..before.len()] == before[..]);
 }
 
+/// Lights without area come and go, some of them among those that share a column: what is undone leaves no trace. One that
+/// was taken away still changed how long the others were solved, and kept its share of the rays of a shared column.
+#[test]
+fn lights_that_come_and_go_leave_no_trace() {
+    let options = SessionOptions { elements: 900, rays: 32, ..SessionOptions::default() };
+    for (scene, seeds, reach) in [(cornell_box(), 0..16, 0.5), (furnished(), 16..20, 2.0), (full(), 20..28, 0.5)] {
+        let mut session = Session::new(scene, &options).unwrap();
+        finish(&mut session);
+        let before = bits(&session);
+        for seed in seeds {
+            let mut dice = Dice(Random::new(seed));
+            let mut inverse = Vec::new();
+            for _ in 0..1 + dice.below(4) {
+                let lights = session.model().lights.len();
+                let light = LightId(dice.below(lights) as u32);
+                let edit = match dice.below(4) {
+                    0 if seed % 2 == 0 => Edit::DeleteLight { light },
+                    1 if seed % 2 == 0 => Edit::Light { light, dimming: 0.3, colour: [1.0, 0.5, 0.2] },
+                    _ => Edit::AddLight { light: NewLight { intensity: [1e3, 1.0, 30.0], ..dice.light(reach) } },
+                };
+                if let Ok(applied) = session.apply(&edit) {
+                    inverse.push(applied.inverse);
+                }
+                if dice.below(2) == 0 {
+                    finish(&mut session);
+                }
+            }
+            for back in inverse.into_iter().rev() {
+                session.apply(&back).unwrap();
+            }
+            finish(&mut session);
+            assert!(bits(&session) == before, "seed {seed}");
+        }
+    }
+}
+
+/// The Cornell box with so many lamps that the last of them share a column.
+fn full() -> Scene {
+    let mut scene = cornell_box();
+    for k in 0..33 {
+        let position = glam::DVec3::new(0.1 + 0.01 * f64::from(k), 0.4, 0.3);
+        scene.lights.push(PointLight {
+            name: format!("lamp {k}"),
+            kind: PointLightKind::Point,
+            position,
+            direction: glam::DVec3::NEG_Y,
+            intensity: [1.0 + k as f32, 2.0, 1.0],
+            range: None,
+        });
+    }
+    scene
+}
+
+/// Of two lamps that share a column the bright one is taken away: all shadow rays go to the other, whose light is as even
+/// as if it had always been alone.
+#[test]
+fn a_lamp_that_is_gone_takes_no_rays_of_a_shared_column() {
+    let options = SessionOptions { elements: 900, rays: 32, ..SessionOptions::default() };
+    let mut scene = full();
+    let mut bright = scene.lights[32].clone();
+    (bright.name, bright.intensity) = ("bright".to_owned(), [1e4; 3]);
+    let mut alone = Session::new(scene.clone(), &options).unwrap();
+    scene.lights.push(bright);
+    let mut session = Session::new(scene, &options).unwrap();
+    let light = session.model().lights.iter().find(|light| light.name == "bright").unwrap().id;
+    finish(&mut session);
+    let both = bits(&session);
+    let applied = session.apply(&Edit::DeleteLight { light }).unwrap();
+    assert!(applied.traces);
+    finish(&mut session);
+    finish(&mut alone);
+    assert!(bits(&session) == bits(&alone));
+    session.apply(&applied.inverse).unwrap();
+    finish(&mut session);
+    assert!(bits(&session) == both);
+}
+
 /// The error that was told stayed that of the first light, whatever was dimmed.
 #[test]
 fn the_error_is_that_of_the_light_that_is_shown() {

@@ -95,12 +95,12 @@ pub enum Edit {
         /// From the place in the file to that of the copy.
         matrix: [f64; 16],
     },
-    /// Takes a light without area away. It keeps its id. Traces no ray.
+    /// Takes a light without area away. It keeps its id. Traces no ray, unless it shares its column with others.
     DeleteLight {
         /// The light.
         light: LightId,
     },
-    /// Brings a light back that was taken away. Traces no ray.
+    /// Brings a light back that was taken away. Traces no ray, unless it shares its column with others.
     RestoreLight {
         /// The light.
         light: LightId,

@@ -531,12 +531,14 @@ impl Session {
         Edit::DeleteLight { light: LightId(index as u32) }
     }
 
-    /// Takes a light without area away or brings it back: it is dark meanwhile, and its rays stay.
+    /// Takes a light without area away or brings it back: it is dark meanwhile, and its rays stay; those of a shared column are
+    /// shared out anew.
     fn set_gone(&mut self, light: LightId, is_gone: bool, done: &mut Done) {
         let own = &mut self.lights[light.0 as usize];
         own.is_gone = is_gone;
         if self.strands[own.strand].is_shared {
-            done.dimmed.insert(own.strand);
+            done.strands.insert(own.strand);
+            done.traces = true;
         }
     }
 

@@ -29,7 +29,7 @@ pub struct Light {
     pub is_direct: bool,
     /// Where its light is solved.
     pub strand: usize,
-    /// Whether it was taken away by itself. Its rays stay.
+    /// Whether it was taken away by itself. Its rays stay, but in a shared column, where others need them.
     pub is_gone: bool,
 }
 
@@ -162,9 +162,11 @@ pub fn strand_of(strands: &mut Vec<Strand>, light: usize) -> usize {
     strand
 }
 
-/// The lamps of a strand's column, with what each is multiplied by in it.
+/// The lamps of a strand's column, with what each is multiplied by in it. Those of a shared column share its rays by their power,
+/// so those that are gone are not among them.
 pub fn lamps(strand: &Strand, lights: &[Light]) -> (Vec<Lamp>, Vec<Bands>) {
-    let direct = strand.lights.iter().map(|light| &lights[*light]).filter(|light| light.is_direct);
+    let takes_rays = |light: &&Light| light.is_direct && !(strand.is_shared && light.is_gone);
+    let direct = strand.lights.iter().map(|light| &lights[*light]).filter(takes_rays);
     direct
         .filter_map(|light| {
             let lamp = match light.body {

@@ -5,7 +5,8 @@
 //! iterate before, ω₁ = 1, ω₂ = 2/(2 − σ²), ω' = 1/(1 − σ² ω/4). With the spectrum of R F within ±σ a white room takes the
 //! square root of the sweeps. What is beyond σ converges too, only slower. It multiplies by polynomials of R F, so light never
 //! gets where no ray goes: a sealed dark room stays black to the last bit. The start and the rule for the end are
-//! fixed, and so is every order of summation: the same rows give the same bits.
+//! fixed, and so is every order of summation: the same rows give the same bits. Each column ends by its own residual and stays as
+//! it was then, so that its bits do not depend on what is solved beside it.
 
 use radiosity_transport::live::{Lanes, Live};
 use rayon::prelude::*;
@@ -117,11 +118,15 @@ pub struct Solve<const W: usize> {
     gathered: Vec<Lanes<W>>,
     omega: f64,
     sweeps: u32,
-    /// Irradiance by id, at the last sweep.
+    /// Irradiance by id, of each column at its last sweep.
     pub h: Vec<Lanes<W>>,
-    /// ‖G(Y) − Y‖/‖Y‖ of the last sweep, weighted by area.
-    pub residual: f64,
+    /// ‖G(Y) − Y‖/‖Y‖ of each column at its last sweep, weighted by area; beyond the last column nothing.
+    residuals: [f64; MOST_TOGETHER],
+    has_ended: [bool; MOST_TOGETHER],
 }
+
+/// Columns that are solved together at most.
+pub const MOST_TOGETHER: usize = 5;
 
 impl<const W: usize> Solve<W> {
     /// Begins at `start`, or at E + R D.
@@ -134,41 +139,63 @@ impl<const W: usize> Solve<W> {
         });
         let nothing = || vec![Lanes::default(); n];
         let (before, gathered, h) = (nothing(), nothing(), nothing());
-        Solve { e, d, y, before, gathered, omega: 0.0, sweeps: 0, h, residual: f64::INFINITY }
+        Solve {
+            e,
+            d,
+            y,
+            before,
+            gathered,
+            omega: 0.0,
+            sweeps: 0,
+            h,
+            residuals: [f64::INFINITY; MOST_TOGETHER],
+            has_ended: [false; MOST_TOGETHER],
+        }
     }
 
-    /// One sweep over the first `rays` rays of each row; answers whether the residual is at most `tolerance`.
+    /// One sweep over the first `rays` rays of each row; answers whether the residual of each column was at most `tolerance` at
+    /// its end.
     pub fn sweep(&mut self, live: &Live, answer: &Answer, rays: usize, tolerance: f64) -> bool {
-        live.gather(&self.y, rays, &mut self.h);
-        self.h.par_iter_mut().zip(&self.d).with_min_len(4096).for_each(|(h, d)| {
+        live.gather(&self.y, rays, &mut self.gathered);
+        let columns = W / 3;
+        let is_open: [bool; W] = std::array::from_fn(|k| k / 3 < columns && !self.has_ended[k / 3]);
+        let lanes = self.h.par_iter_mut().zip(&self.gathered).zip(&self.d).with_min_len(4096);
+        lanes.for_each(|((h, gathered), d)| {
             for k in 0..W {
-                h.0[k] += d.0[k];
+                h.0[k] = if is_open[k] { gathered.0[k] + d.0[k] } else { h.0[k] };
             }
         });
         answer.respond(&self.e, &self.h, &mut self.gathered);
-        let sums: Vec<[f64; 2]> = self
+        let sums: Vec<[[f64; 2]; MOST_TOGETHER]> = self
             .gathered
             .par_chunks(SUM)
             .zip(self.y.par_chunks(SUM))
             .zip(answer.area.par_chunks(SUM))
             .map(|((new, old), area)| {
-                let mut sums = [0f64; 2];
+                let mut sums = [[0f64; 2]; MOST_TOGETHER];
                 for ((new, old), area) in new.iter().zip(old).zip(area) {
-                    let mut own = [0f32; 2];
-                    for k in 0..W {
-                        own[0] += (new.0[k] - old.0[k]).powi(2);
-                        own[1] += old.0[k].powi(2);
+                    for (column, sum) in sums.iter_mut().enumerate().take(columns) {
+                        let mut own = [0f32; 2];
+                        for k in 3 * column..3 * column + 3 {
+                            own[0] += (new.0[k] - old.0[k]).powi(2);
+                            own[1] += old.0[k].powi(2);
+                        }
+                        sum[0] += f64::from(*area) * f64::from(own[0]);
+                        sum[1] += f64::from(*area) * f64::from(own[1]);
                     }
-                    sums[0] += f64::from(*area) * f64::from(own[0]);
-                    sums[1] += f64::from(*area) * f64::from(own[1]);
                 }
                 sums
             })
             .collect();
-        let [change, whole] = sums.iter().fold([0f64; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
-        self.residual = if change > 0.0 { (change / whole.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 };
         self.sweeps += 1;
-        if self.residual <= tolerance || self.sweeps >= MOST_SWEEPS {
+        for column in (0..columns).filter(|column| is_open[3 * column]) {
+            let add = |sum: [f64; 2], own: &[[f64; 2]; MOST_TOGETHER]| [0, 1].map(|k| sum[k] + own[column][k]);
+            let [change, whole] = sums.iter().fold([0f64; 2], add);
+            let residual = if change > 0.0 { (change / whole.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 };
+            self.residuals[column] = residual;
+            self.has_ended[column] = residual <= tolerance || self.sweeps >= MOST_SWEEPS;
+        }
+        if self.has_ended[..columns].iter().all(|has_ended| *has_ended) {
             return true;
         }
         let square = answer.radius * answer.radius;
@@ -189,6 +216,11 @@ impl<const W: usize> Solve<W> {
         false
     }
 
+    /// The largest residual of a column.
+    pub fn residual(&self) -> f64 {
+        self.residuals[..W / 3].iter().copied().fold(0.0, f64::max)
+    }
+
     /// The direct light that it is solved for.
     pub fn direct(&self) -> &[Lanes<W>] {
         &self.d
@@ -197,5 +229,65 @@ impl<const W: usize> Solve<W> {
     /// What surfaces give off at the last sweep.
     pub fn radiosity(&self) -> &[Lanes<W>] {
         &self.y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::{Session, SessionOptions};
+    use std::time::Duration;
+
+    /// A column has the bits that it has alone, whatever is solved beside it and wherever it lies: dark, even, or so uneven
+    /// that it takes other sweeps.
+    #[test]
+    fn a_column_does_not_depend_on_those_beside_it() {
+        let options = SessionOptions { elements: 900, rays: 64, shadow_rays: Some(4), ..SessionOptions::default() };
+        let mut session = Session::new(crate::cornell_box(), &options).unwrap();
+        while !session.step(Duration::from_millis(3)).is_done {}
+        let (live, answer) = (&session.live, &session.answer);
+        let lit = |column: usize, id: usize| match column {
+            0 => [1e3, 0.0, 2.0],
+            1 => [0.0; 3],
+            2 => [if id == 7 { 1e5 } else { 0.0 }; 3],
+            3 => [if id % 97 == 0 { 1e-3 } else { 0.0 }, 4.0, 0.0],
+            _ => [0.0, 0.0, 1e4 / (1.0 + id as f32)],
+        };
+        let solve = |columns: &[usize]| match columns.len() {
+            1 => solved::<4>(live, answer, columns, lit),
+            2 => solved::<8>(live, answer, columns, lit),
+            _ => solved::<16>(live, answer, columns, lit),
+        };
+        let alone: Vec<(Vec<[u32; 3]>, u32)> = (0..5).map(|column| solve(&[column]).remove(0)).collect();
+        let sweeps: std::collections::BTreeSet<u32> = alone.iter().map(|(_, sweeps)| *sweeps).collect();
+        assert!(sweeps.len() > 2, "columns that all end together show nothing: {sweeps:?}");
+        for columns in [&[0, 1][..], &[2, 0], &[3, 4], &[0, 1, 2, 3, 4], &[4, 2, 3, 0, 1], &[2, 1, 0], &[0, 3, 4, 2]] {
+            for (column, (light, _)) in columns.iter().zip(solve(columns)) {
+                assert!(light == alone[*column].0, "column {column} among {columns:?}");
+            }
+        }
+    }
+
+    /// Columns, and how many sweeps they took together.
+    fn solved<const W: usize>(
+        live: &Live,
+        answer: &Answer,
+        columns: &[usize],
+        lit: impl Fn(usize, usize) -> [f32; 3],
+    ) -> Vec<(Vec<[u32; 3]>, u32)> {
+        let ids = live.ids();
+        let (mut e, mut d) = (vec![Lanes::<W>::default(); ids], vec![Lanes::<W>::default(); ids]);
+        for (k, column) in columns.iter().enumerate() {
+            for id in 0..ids {
+                // The third is found by rows, and all others by shadow rays.
+                let to = if *column == 2 { &mut e } else { &mut d };
+                to[id].0[3 * k..3 * k + 3].copy_from_slice(&lit(*column, id));
+            }
+        }
+        let mut solve = Solve::new(answer, e, d, None);
+        while !solve.sweep(live, answer, 64, 1e-4) {}
+        assert!(solve.residual() <= 1e-4);
+        let of = |k: usize| solve.h.iter().map(|h| [0, 1, 2].map(|band| h.0[3 * k + band].to_bits())).collect();
+        (0..columns.len()).map(|k| (of(k), solve.sweeps)).collect()
     }
 }

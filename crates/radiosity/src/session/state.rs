@@ -293,7 +293,7 @@ impl Session {
         };
         if total.sweep(&self.live, &self.answer, rays as usize, ROUGH_TOLERANCE) {
             self.state.solved_rays = rays;
-            self.state.residual = total.residual;
+            self.state.residual = total.residual();
             self.state.given = total.radiosity().to_vec();
             self.state.direct = total.direct().to_vec();
             let mut h = std::mem::take(&mut total.h);
@@ -322,9 +322,9 @@ impl Session {
         };
         let (live, answer, rays) = (&self.live, &self.answer, self.live.target().rays as usize);
         let (is_done, residual) = match &mut block {
-            Block::One(solve) => (solve.sweep(live, answer, rays, TOLERANCE), solve.residual),
-            Block::Two(solve) => (solve.sweep(live, answer, rays, TOLERANCE), solve.residual),
-            Block::Five(solve) => (solve.sweep(live, answer, rays, TOLERANCE), solve.residual),
+            Block::One(solve) => (solve.sweep(live, answer, rays, TOLERANCE), solve.residual()),
+            Block::Two(solve) => (solve.sweep(live, answer, rays, TOLERANCE), solve.residual()),
+            Block::Five(solve) => (solve.sweep(live, answer, rays, TOLERANCE), solve.residual()),
         };
         self.state.residual = residual;
         if !is_done {
