@@ -246,6 +246,18 @@ impl World {
         common || self.apart.iter().any(|body| self.blocked_by(*body as usize, ray, salt))
     }
 
+    /// Calls back with the object of each surface that stops a ray before its end, in any order, more than once for some.
+    pub fn all_in_the_way(&self, ray: &Ray, salt: u32, mut visit: impl FnMut(usize)) {
+        self.common.blocked_where(ray, |t, u, v, _| {
+            let body = self.body_of[t as usize] as usize;
+            if !self.is_away[body] && self.stops(t, u, v, salt) {
+                visit(body);
+            }
+            false
+        });
+        self.apart.iter().map(|body| *body as usize).filter(|body| self.blocked_by(*body, ray, salt)).for_each(visit);
+    }
+
     /// Whether one of some objects stops a ray before its end.
     pub fn blocked_by_any(&self, ray: &Ray, salt: u32, is_one: impl Fn(usize) -> bool) -> bool {
         let common = self.common.blocked_where(ray, |t, u, v, _| {
