@@ -59,6 +59,10 @@ const PIECE: Duration = Duration::from_millis(5);
 /// Changes that may gather in any case.
 const LEAST_ROOM: usize = 64;
 
+/// Changed objects beyond which a chunk that has not seen them traces all its rays anew: each costs a look at every element,
+/// and with so many of them that takes about as long.
+const MOST_MENDED: usize = 128;
+
 /// What is dirty is worked out for all chunks together that have seen as many changes, for so many numbers of them.
 const MOST_SHARED: usize = 8;
 
@@ -163,6 +167,19 @@ impl Live {
     fn forget(&mut self, body: usize) {
         let (world, changes) = (&self.world, self.changes.len());
         self.chunks.iter_mut().filter(|chunk| chunk.body == body).for_each(|chunk| chunk.forget(world, changes));
+    }
+
+    /// Forgets all rays of chunks that have not seen changes of very many objects.
+    fn forget_much_changed(&mut self) {
+        let mut bodies = BTreeSet::new();
+        let too_many = |change: &Change| {
+            bodies.insert(change.body);
+            bodies.len() > MOST_MENDED
+        };
+        let Some(last) = self.changes.iter().rposition(too_many) else { return };
+        let (world, changes) = (&self.world, self.changes.len());
+        let has_not_seen = |chunk: &&mut Chunk| chunk.seen().into_iter().any(|seen| seen <= last);
+        self.chunks.par_iter_mut().filter(has_not_seen).for_each(|chunk| chunk.forget(world, changes));
     }
 
     /// Notes that an object changes.
@@ -279,6 +296,8 @@ impl Live {
     /// Traces what edits have dirtied and what is missing, piece by piece as long as `go_on` says so; at least one piece. Answers
     /// whether all is done. The part [`Part::Far`] is all of it, [`Part::Near`] the first rays of each row.
     pub fn work(&mut self, part: Part, mut go_on: impl FnMut() -> bool) -> bool {
+        self.world.join_trees();
+        self.forget_much_changed();
         let mut batch = self.batch.max(2 * rayon::current_num_threads());
         let (chunks, mut work) = self.split();
         let seen: BTreeSet<usize> = chunks.iter().flat_map(|chunk| chunk.seen()).collect();
@@ -311,6 +330,7 @@ impl Live {
             if self.world.is_scattered() {
                 self.world.gather_trees();
             }
+            self.world.drop_trees();
         }
         is_done
     }
@@ -416,5 +436,73 @@ mod tests {
         other.place(0, DAffine3::from_translation(DVec3::new(0.01 * shift(595).translation.x, 0.0, 0.0)));
         other.work(Part::Far, || true);
         assert!(all(&live) == all(&other));
+    }
+
+    /// A floor with many boxes on it, some of them see-through, and a lamp above; no ray is traced yet.
+    fn field(boxes: u32, target: Target) -> Live {
+        let mut scene = Scene::default();
+        scene.materials.push(radiosity_scene::Material { emissive: [1.0; 3], ..Default::default() });
+        let mut glass =
+            radiosity_scene::Material { alpha_mode: radiosity_scene::AlphaMode::Blend, ..Default::default() };
+        glass.base_color[3] = 0.5;
+        scene.materials.extend([radiosity_scene::Material::default(), glass]);
+        let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let quad =
+            |at: DVec3, size: f64| [[0., 0.], [1., 0.], [1., 1.], [0., 1.]].map(|[x, y]| at + size * corner(x, y, 0.0));
+        scene.add_quad("floor", 1, quad(corner(-1.0, -1.0, 0.0), 22.0));
+        let mut lamp = quad(corner(8.0, 8.0, 4.0), 3.0);
+        lamp.reverse();
+        scene.add_quad("lamp", 0, lamp);
+        for k in 0..boxes {
+            let at = corner(f64::from(k % 20), f64::from(k / 20), 0.1);
+            let top = quad(at + 0.6 * DVec3::Z, 0.5);
+            let [a, b, c, d] = top;
+            let foot = at + corner(0.2, 0.2, 0.0);
+            let sides = [[a, foot, b], [b, foot, c], [c, foot, d], [d, foot, a], [a, b, c], [a, c, d]];
+            scene.add_triangles(&format!("box {k}"), 1 + usize::from(k % 3 == 0), &sides);
+        }
+        let mut live = Live::new(Arc::new(scene), 3.0, target);
+        live.add_column(1, &[Lamp::Body(1)]);
+        live.set_target(target);
+        live
+    }
+
+    /// Many objects are moved at once, so many that they get a tree together, that all rays are traced anew, or that one tree is
+    /// built for all: light is that of a fresh start with one tree. Each ray looked at each of them.
+    #[test]
+    fn many_things_are_moved_at_once() {
+        let target = Target { rays: 128, shadows: 16 };
+        let boxes = 300;
+        for moved in [7, 40, 120, 140, 290] {
+            let place = |k: u32, step: u32| {
+                let turn = DAffine3::from_rotation_z(0.1 * f64::from(k));
+                DAffine3::from_translation(DVec3::new(0.3 * f64::from(step), 0.02 * f64::from(k % 7), 0.1)) * turn
+            };
+            let mut live = field(boxes, target);
+            live.work(Part::Far, || true);
+            let before = live.rays_traced();
+            for step in 0..3 {
+                for k in 0..moved {
+                    live.place(2 + (k * 41 % boxes) as usize, place(k, step));
+                }
+                if step == 1 {
+                    live.remove(2 + 41);
+                }
+                // The first time half of it, then the first part, then all.
+                let mut pieces = 3;
+                live.work(if step == 1 { Part::Near } else { Part::Far }, || {
+                    pieces -= i32::from(step == 0);
+                    pieces > 0
+                });
+            }
+            assert!(
+                live.rays_traced() > before && live.world.bodies.iter().all(|body| body.tree.is_none() || moved < 7)
+            );
+            let mut other = field(boxes, target);
+            (0..moved).for_each(|k| other.place(2 + (k * 41 % boxes) as usize, place(k, 2)));
+            other.world.gather_trees();
+            other.work(Part::Far, || true);
+            assert!(all(&live) == all(&other), "{moved}");
+        }
     }
 }

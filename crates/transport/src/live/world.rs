@@ -1,7 +1,7 @@
 //! All objects, and who is met first among them.
 //!
 //! One tree of boxes has all objects as they were when it was built; those that were moved since are passed there and
-//! have trees of their own. Which hit counts depends on the triangles alone: the smallest key, of equal ones the lowest
+//! have trees of their own, and many of them one more together. Which hit counts depends on the triangles alone: the smallest key, of equal ones the lowest
 //! number. So hits do not depend on how the objects are shared out among the trees.
 
 use super::body::{Body, Bounds, Shape};
@@ -14,7 +14,8 @@ use std::sync::Arc;
 /// How far from the middle objects may be, in half extents of the scene as it was handed in.
 pub const REACH: f64 = 4.0;
 
-/// Objects with trees of their own beyond which one tree is built for all: each costs every ray a look at its box.
+/// Objects with trees of their own beyond which one tree is built for all: each costs every ray a look at its box. While rays are
+/// traced it is one for these alone, as in large scenes nobody waits for one of all.
 const MOST_APART: usize = 6;
 
 /// Backs that one sees through along a line: of more, as in a stack of one-sided sheets, what is behind is not told.
@@ -43,11 +44,20 @@ pub struct World {
     is_away: Vec<bool>,
     /// Whether every ray stops where the common tree says.
     is_plain: bool,
-    /// Objects with trees of their own.
+    /// Objects that are met in trees of their own, in their order.
     apart: Vec<u32>,
+    /// One tree for all of these, if there is one.
+    joint: Option<Joint>,
     is_opaque: bool,
     /// Next free id.
     ids: u32,
+}
+
+/// A tree of several objects.
+struct Joint {
+    tree: Tree,
+    /// The number of each of its triangles among all, which grow.
+    triangles: Vec<u32>,
 }
 
 /// What a ray met.
@@ -82,6 +92,7 @@ impl World {
             is_away: Vec::new(),
             is_plain: false,
             apart: Vec::new(),
+            joint: None,
             is_opaque: true,
             ids: sky.len() as u32,
             scene,
@@ -139,9 +150,9 @@ impl World {
         own.tree = Some(Tree::new(&single(&own.corners)).as_part((REACH * self.half) as f32));
         self.is_away[body] = true;
         self.is_plain = false;
-        if !self.apart.contains(&(body as u32)) {
-            self.apart.push(body as u32);
-            self.apart.sort_unstable();
+        self.joint = None;
+        if let Err(at) = self.apart.binary_search(&(body as u32)) {
+            self.apart.insert(at, body as u32);
         }
     }
 
@@ -151,6 +162,7 @@ impl World {
         self.bodies[body].tree = None;
         self.is_away[body] = true;
         self.is_plain = false;
+        self.joint = None;
         self.apart.retain(|other| *other != body as u32);
     }
 
@@ -159,17 +171,42 @@ impl World {
         self.apart.len() > MOST_APART
     }
 
-    /// Builds one tree for all objects.
+    /// Before rays are traced: sees to it that they look at few trees. Objects keep those of their own.
+    pub fn join_trees(&mut self) {
+        if !self.is_scattered() || self.joint.is_some() {
+            return;
+        }
+        let count: usize = self.apart.iter().map(|body| self.bodies[*body as usize].corners.len()).sum();
+        if 2 * count > self.body_of.len() {
+            // One for all takes as long, and rays need not pass the most of the common one.
+            return self.gather_trees();
+        }
+        let (mut corners, mut triangles) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for body in self.apart.iter().map(|body| &self.bodies[*body as usize]) {
+            corners.extend(single(&body.corners));
+            triangles.extend((body.first_triangle..).take(body.corners.len()));
+        }
+        self.joint = Some(Joint { tree: Tree::new(&corners).as_part((REACH * self.half) as f32), triangles });
+    }
+
+    /// Drops trees of objects that are met in the common one.
+    pub fn drop_trees(&mut self) {
+        for (body, _) in self.bodies.iter_mut().zip(&self.is_away).filter(|(_, is_away)| !**is_away) {
+            body.tree = None;
+        }
+    }
+
+    /// Builds one tree for all objects, which keep those of their own.
     pub fn gather_trees(&mut self) {
         let mut corners = Vec::with_capacity(self.body_of.len());
-        for body in &mut self.bodies {
+        for body in &self.bodies {
             if body.is_present {
                 corners.extend(single(&body.corners));
             } else {
                 corners.extend(std::iter::repeat_n([Vec3::NAN; 3], body.corners.len()));
             }
-            body.tree = None;
         }
+        self.joint = None;
         self.common = Tree::new(&corners).as_part((REACH * self.half) as f32);
         self.is_away.fill(false);
         self.is_plain = self.is_opaque;
@@ -204,14 +241,38 @@ impl World {
             })
         };
         let mut first = hit.map(|hit| self.met(&self.common, &hit, 0));
-        for &body in &self.apart {
-            if let Some(met) = self.first_of(body as usize, ray, salt, first.map_or(ray.t_max, |met| met.key))
+        let mut compete = |find: &dyn Fn(f32) -> Option<Met>| {
+            if let Some(met) = find(first.map_or(ray.t_max, |met| met.key))
                 && first.is_none_or(|best| (met.key, met.triangle) < (best.key, best.triangle))
             {
                 first = Some(met);
             }
+        };
+        match &self.joint {
+            Some(joint) => compete(&|key| self.first_of_joint(joint, ray, salt, key)),
+            None => self.apart.iter().for_each(|body| compete(&|key| self.first_of(*body as usize, ray, salt, key))),
         }
         first
+    }
+
+    /// What a ray meets first of the objects of one tree, if its key is no more than `key`.
+    fn first_of_joint(&self, joint: &Joint, ray: &Ray, salt: u32, key: f32) -> Option<Met> {
+        let ray = Ray { t_max: ray.t_max.min(key.next_up()), skip: self.skip_of_joint(joint, ray.skip), ..*ray };
+        let hit = if self.is_opaque {
+            joint.tree.closest(&ray)
+        } else {
+            joint.tree.closest_where(&ray, |t, u, v, _| self.stops(joint.triangles[t as usize], u, v, salt))
+        };
+        let met =
+            hit.map(|hit| Met { triangle: joint.triangles[hit.triangle as usize], ..self.met(&joint.tree, &hit, 0) });
+        met.filter(|met| met.key <= key)
+    }
+
+    /// What the number of a triangle among all is in the tree of several objects.
+    fn skip_of_joint(&self, joint: &Joint, skip: u32) -> u32 {
+        let is_away = self.body_of.get(skip as usize).is_some_and(|body| self.is_away[*body as usize]);
+        let place = if is_away { joint.triangles.binary_search(&skip).ok() } else { None };
+        place.map_or(u32::MAX, |place| place as u32)
     }
 
     /// What a ray meets first of an object with a tree of its own, if its key is no more than `key`.
@@ -243,7 +304,14 @@ impl World {
                 !self.is_away[self.body_of[t as usize] as usize] && self.stops(t, u, v, salt)
             })
         };
-        common || self.apart.iter().any(|body| self.blocked_by(*body as usize, ray, salt))
+        common
+            || match &self.joint {
+                Some(joint) => {
+                    let ray = Ray { skip: self.skip_of_joint(joint, ray.skip), ..*ray };
+                    joint.tree.blocked_where(&ray, |t, u, v, _| self.stops(joint.triangles[t as usize], u, v, salt))
+                }
+                None => self.apart.iter().any(|body| self.blocked_by(*body as usize, ray, salt)),
+            }
     }
 
     /// Calls back with the object of each surface that stops a ray before its end, in any order, more than once for some.
