@@ -209,8 +209,9 @@ export class App {
 
   private begin(): void {
     this.isCaughtUp = true;
+    // Who has looked around goes on as before when the connection is back.
+    if (this.opened === null) this.navigator.choose();
     this.opened ??= performance.now();
-    if (this.selected === null) this.navigator.choose();
     this.measuring.begin();
     this.tell('view');
     this.tell('connection');

@@ -144,6 +144,7 @@ export class Stage {
       texture.wrapS = RepeatWrapping;
       texture.magFilter = texture.minFilter = LinearFilter;
       texture.needsUpdate = true;
+      this.sky.material.uniforms.picture.value?.dispose();
       this.sky.material.uniforms.picture.value = texture;
       this.sky.material.uniforms.hasPicture.value = true;
     }

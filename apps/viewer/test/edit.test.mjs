@@ -339,6 +339,13 @@ test('the sky is known by its lux, and follows them', async () => {
   await lux.press('Enter');
   assert.equal(await lux.inputValue(), '12500');
   await picture(page, 'sky');
+  // With the connection lost and found comes another picture of it, and the old one goes.
+  await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.stage.sky.material.uniforms.picture.value.addEventListener('dispose', () => { window.isFreed = true; });
+    app.connection.drop();
+  });
+  await page.waitForFunction(() => window.isFreed && window.radiosity.state().isCaughtUp);
   assert.deepEqual(page.faults, []);
   await page.context().close();
   await outside.end();

@@ -377,6 +377,8 @@ test('two pages see the same, and one that lost its connection catches up', asyn
   await Promise.all([done(one), done(two)]);
   const { edits } = (await state(one)).status;
   const light = (await state(one)).lights[0].id;
+  const mode = (await state(two)).mode === 'walk' ? 'orbit' : 'walk';
+  await two.evaluate((mode) => window.radiosity.app.walk(mode), mode);
   await two.context().setOffline(true);
   await two.evaluate(() => window.radiosity.app.connection.drop());
   await two.waitForFunction(() => !window.radiosity.state().isConnected);
@@ -391,6 +393,7 @@ test('two pages see the same, and one that lost its connection catches up', asyn
   const lux = (page) => page.evaluate(() => window.radiosity.points(80).map((point) => window.radiosity.lux(point)));
   assert.deepEqual(await lux(two), await lux(one));
   assert.equal((await state(two)).lights[0].dimming, 0.25);
+  assert.equal((await state(two)).mode, mode, 'one moves as one has chosen');
   await restored(one);
   await Promise.all([one.context().close(), two.context().close()]);
 });
