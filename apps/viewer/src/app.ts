@@ -5,7 +5,7 @@ import { keep, kept, numberOf, type Curve } from './curve';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
 import { boxAhead, panelAhead, reshaped, type Shaped, tiltOf } from './forms';
-import { beside, lampAhead, raysOf, type Lamp, type LampKind, type Sun } from './lamps';
+import { beside, lampAhead, namesOf, raysOf, type Lamp, type LampKind, type Sun } from './lamps';
 import { Marks } from './marks';
 import { Measuring } from './measuring';
 import { Navigator } from './navigate';
@@ -86,6 +86,8 @@ export class App {
   private messageTimer = 0;
   /** How lights were dimmed before all of them were turned off. */
   private levels = new Map<number, number>();
+  /** What people call lights, since one changed last. */
+  private lightNames: Map<number, string> | null = null;
 
   constructor() {
     this.connection = new Connection({
@@ -94,6 +96,12 @@ export class App {
       light: (frame) => this.shine(frame),
       connected: (is) => this.connected(is),
     });
+    // Once for all that comes between two pictures, however many objects that are.
+    this.on('selection', () => {
+      this.marks.outline(this.group());
+      this.gizmo.place();
+    });
+    this.on('objects', () => { if (this.edges) this.marks.edges(this.stage.surfaces); });
     setInterval(() => this.refresh(), 500);
   }
 
@@ -237,23 +245,19 @@ export class App {
     surface.matrix.fromArray(object.matrix);
     this.stage.moved(surface);
     this.measuring.follow(surface);
-    if (!this.inherit() && this.group().includes(surface)) {
-      this.marks.outline(this.group());
-      this.gizmo.place();
-      this.tellSoon('selection');
-    }
+    const chosen = this.selected === null ? undefined : this.objects.get(this.selected);
+    if (!this.inherit() && object.group === chosen?.group) this.tellSoon('selection');
     if (object.deleted) this.measuring.lose(surface);
-    if (this.edges) this.marks.edges(this.stage.surfaces);
     this.stage.change();
   }
 
   /** A light is shown as it is now. */
   private shed(light: LightNotice): void {
+    this.lightNames = null;
     this.marks.light(light);
     if (light.type === 'sky') this.stage.dimSky(light.colour.map((band) => band * light.dimming));
     if (light.id === this.selectedLight) {
       if (light.deleted) this.selectLight(null);
-      else this.gizmo.place();
       this.tellSoon('selection');
     }
     if (light.deleted && typeof this.layer === 'object' && 'light' in this.layer && this.layer.light === light.id) this.showLayer('total');
@@ -476,7 +480,6 @@ export class App {
   loosen(): void {
     const object = this.selected === null ? undefined : this.objects.get(this.selected);
     if (object) this.loosened.add(object.group);
-    this.gizmo.place();
     this.tell('selection');
   }
 
@@ -694,24 +697,19 @@ export class App {
   private mark(object: number | null): void {
     this.selected = object;
     this.selectedLight = null;
-    this.marks.outline(this.group());
-    this.gizmo.place();
     this.tell('selection');
   }
 
   selectLight(light: number | null): void {
     this.select(null);
     this.selectedLight = light;
-    this.gizmo.place();
     this.tell('selection');
   }
 
-  /** What people call a light: copies have the name of the first that is there, and numbers. */
-  lightName({ id, name, type }: LightNotice): string {
-    if (type === 'sky') return 'Sky';
-    if (!name) return `Light ${id + 1}`;
-    const before = [...this.lights.values()].filter((light) => light.id < id && light.name === name && !light.deleted).length;
-    return before > 0 ? `${name} (${before + 1})` : name;
+  /** What people call a light. */
+  lightName({ id }: LightNotice): string {
+    this.lightNames ??= namesOf(this.lights.values());
+    return this.lightNames.get(id)!;
   }
 
   /** Things and lamps that are there, by name: what can be selected. */

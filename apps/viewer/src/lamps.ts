@@ -29,6 +29,20 @@ const CLEAR = 0.3;
 /** Share of the picture's height, from its middle, up to which a lamp is well seen. */
 const SEEN = 0.85;
 
+/** What people call lights, by their numbers: copies have the name of the first that is there, and numbers. */
+export function namesOf(lights: Iterable<LightNotice>): Map<number, string> {
+  const names = new Map<number, string>();
+  const counts = new Map<string, number>();
+  for (const { id, name, type, deleted } of lights) {
+    const before = counts.get(name) ?? 0;
+    if (type === 'sky') names.set(id, 'Sky');
+    else if (!name) names.set(id, `Light ${id + 1}`);
+    else names.set(id, before > 0 ? `${name} (${before + 1})` : name);
+    if (!deleted) counts.set(name, before + 1);
+  }
+  return names;
+}
+
 /** Solid angle that a lamp fills as if it were as bright everywhere as in its middle. A spot fades by the square of what is
  *  left of the cosine between both angles, as glTF has it. */
 export function solidAngle(cone: number[] | null): number {

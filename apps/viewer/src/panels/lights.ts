@@ -18,22 +18,28 @@ export function lightsPanel(app: App): HTMLElement {
     id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind | 'panel'; },
   }, ...[...LAMPS, ['panel', 'Panel']].map(([value, text]) => el('option', { value }, text)));
   const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp where you look: 1000 lm, in rooms for people a panel of 4000 lm on the ceiling above, parallel light of 10 000 lx' }));
+  const count = () => {
+    const there = [...app.lights.values()].filter(({ deleted }) => !deleted).length;
+    // While the scene comes, some may come still.
+    none.hidden = there > 0 || !app.isCaughtUp;
+    all.hidden = there < 2;
+  };
   app.on('lights', () => {
-    for (const light of app.lights.values()) {
+    let next: HTMLElement | null = null;
+    for (const light of [...app.lights.values()].reverse()) {
       const old = rows.get(light.id);
       // A copy has another name when the first is gone.
       if (old?.name !== app.lightName(light)) {
-        const next = Math.min(...[...rows.keys()].filter((id) => id > light.id));
         rows.set(light.id, row(app, light.id));
         old?.element.remove();
-        list.insertBefore(rows.get(light.id)!.element, rows.get(next)?.element ?? null);
+        list.insertBefore(rows.get(light.id)!.element, next);
       }
+      next = rows.get(light.id)!.element;
       rows.get(light.id)!.set(light);
     }
-    const there = [...app.lights.values()].filter(({ deleted }) => !deleted).length;
-    none.hidden = there > 0;
-    all.hidden = there < 2;
+    count();
   });
+  app.on('connection', count);
   return section('lights', 'Lights', true, none, add, all, list);
 }
 
