@@ -27,8 +27,9 @@ function start(): void {
     const isFolded = document.body.classList.toggle('folded');
     document.querySelector('#fold')?.setAttribute('aria-expanded', String(!isFolded));
   };
+  const meter = meterPanel(app);
   const panel = el('aside', { class: 'panel', 'aria-label': 'Tools' },
-    viewPanel(app), meterPanel(app), thingPanel(app), lightsPanel(app), gridPanel(app), camerasPanel(app));
+    viewPanel(app), meter, thingPanel(app), lightsPanel(app), gridPanel(app), camerasPanel(app));
   const doing = el('span', { id: 'doing' });
   // What is read out: only that the solution begins anew or is ready, and not each step of it.
   const told = el('span', { id: 'told', class: 'unseen', role: 'status' });
@@ -78,6 +79,7 @@ function start(): void {
     if (document.pointerLockElement === canvas) app.measuring.pick(0, 0);
     else if (lamp !== null) app.selectLight(lamp);
     else app.measuring.pick((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
+    if (lamp === null && app.measuring.probed) meter.scrollIntoView({ block: 'nearest' });
   });
   // The cross shows where a keyboard measures; a pointer has its own.
   addEventListener('keydown', () => document.body.classList.add('by-keys'));

@@ -305,6 +305,33 @@ test('what is laid is shown in the panel by itself, and its numbers do not lie b
   await page.context().close();
 });
 
+test('a click brings the meter into view, and after a change no time is told that is not its own', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const isSeen = () => page.evaluate(() => {
+    const [lux, panel] = ['#lux', '.panel'].map((part) => document.querySelector(part).getBoundingClientRect());
+    return lux.height > 0 && lux.top >= panel.top && lux.bottom <= panel.bottom;
+  });
+  await page.locator('#cameras').scrollIntoViewIfNeeded();
+  for (let click = 0; click < 2; click += 1) {
+    await page.locator('.panel').evaluate((panel) => panel.scrollTo(0, panel.scrollHeight));
+    assert.equal(await isSeen(), false);
+    await page.locator('canvas').first().click();
+    await page.waitForFunction(() => window.radiosity.state().probe !== null);
+    assert.equal(await isSeen(), true);
+  }
+
+  const { edits } = (await state(page)).status;
+  const told = () => page.locator('#left').textContent();
+  assert.match(await told(), edits > 0 ? /^done$/ : /^done in /);
+  await page.evaluate(() => window.radiosity.app.setLight(window.radiosity.app.lights.get(0), { dimming: 0.5 }));
+  await done(page, edits + 1);
+  assert.equal(await told(), 'done');
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('the scale of false colours fits what is seen, whatever shines behind a window or lies in the dark', async () => {
   const page = await pages.open(program.url);
   await done(page);

@@ -82,7 +82,9 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     // After a change it is known again when all rays are there; the bar does not jump meanwhile.
     const unknown = status.edits > 0 ? 'noise ± …' : 'error not known yet';
     error.textContent = status.error === null ? unknown : `noise ± ${percent(status.error)}`;
-    left.textContent = status.is_done ? `done in ${duration(status.seconds)}` : status.left === null ? '' : `${duration(status.left)} left`;
+    // The time is that of all changes together: of the last alone it would be wrong.
+    const took = status.edits > 0 ? 'done' : `done in ${duration(status.seconds)}`;
+    left.textContent = status.is_done ? took : status.left === null ? '' : `${duration(status.left)} left`;
   });
   return el('header', {},
     el('div', { class: 'track' }, progress),
