@@ -493,6 +493,39 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   await page.context().close();
 });
 
+test('a decimal comma is a point, typed and pasted, and arrows go on from it', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.select([...app.objects.values()].find(({ name }) => name === 'short block').id);
+  });
+  await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+  const focus = async (label) => {
+    await page.getByRole('spinbutton', { name: label, exact: true }).focus();
+    await page.keyboard.press('Control+a');
+  };
+  const value = (label) => page.getByRole('spinbutton', { name: label, exact: true }).inputValue();
+  await focus('X, metres');
+  await page.keyboard.type('0,25');
+  assert.equal(await value('X, metres'), '0.25');
+  await page.keyboard.press('Enter');
+  await done(page, 1);
+  assert.equal(Number(await value('X, metres')), 0.25);
+  await page.keyboard.press('ArrowUp');
+  await page.waitForFunction(() => Math.abs(window.radiosity.app.stage.toScene(window.radiosity.app.spot()).x - 0.3) < 1e-6);
+  for (const [text, becomes] of [['-3,75', '-3.75'], ['1.234,5', '-3.75']]) {
+    await page.evaluate((text) => navigator.clipboard.writeText(text), text);
+    await focus('Exposure, EV');
+    await page.keyboard.press('Control+v');
+    await page.keyboard.press('Enter');
+    assert.equal(await value('Exposure, EV'), becomes);
+  }
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('around a thing one stays above the ground', async () => {
   const page = await pages.open(program.url);
   await done(page);

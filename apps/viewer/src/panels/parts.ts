@@ -31,9 +31,16 @@ for (const end of ['change', 'focusout']) addEventListener(end, ({ target }) => 
 
 // A number that was emptied, or is none, is what it was: nothing is changed by it.
 const numbers = new WeakMap<EventTarget, string>();
+const KNOWS_COMMA = (0.5).toLocaleString().includes(',');
 const isNumber = (target: EventTarget | null): target is HTMLInputElement => target instanceof HTMLInputElement && target.type === 'number';
-addEventListener('beforeinput', ({ target }) => {
-  if (isNumber(target) && !isOpen(target)) numbers.set(target, target.value);
+addEventListener('beforeinput', (event) => {
+  const { target, data } = event;
+  if (!isNumber(target)) return;
+  if (!isOpen(target)) numbers.set(target, target.value);
+  // Where numbers are written with a point browsers drop a comma, and 0,5 would be 5. Of 1.234,5 none knows what it is: nothing is pasted.
+  if (KNOWS_COMMA || !data?.includes(',')) return;
+  event.preventDefault();
+  if (!/[.,].*[.,]/.test(data)) document.execCommand('insertText', false, data.replace(',', '.'));
 }, { capture: true });
 addEventListener('change', (event) => {
   const { target } = event;
