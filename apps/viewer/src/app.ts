@@ -69,8 +69,8 @@ export class App {
   private news = new Set<Topic>();
   /** Where copies will be that were asked for: the first that comes is selected. */
   private awaited: number[][] = [];
-  /** Forms that were asked for last and have not come, and how many times others were. */
-  private wished = new Map<number, Shaped & { times: number }>();
+  /** Forms that were asked for last and have not come, how many times others were, and how many edits there will be then. */
+  private wished = new Map<number, Shaped & { times: number; edits: number }>();
   /** What was added and selected last. */
   private known: (ObjectNotice & Shaped)[] = [];
   /** Which new lamp will be selected. */
@@ -145,6 +145,7 @@ export class App {
     if (!is) this.drop();
     if (is) {
       this.say('');
+      this.wished.clear();
       this.objectsAhead.forget();
       this.lightsAhead.forget();
     }
@@ -173,8 +174,8 @@ export class App {
       case 'status':
         // Another page may have changed something.
         if (this.status && notice.edits !== this.status.edits) this.exposure.hold();
-        // All has come that was asked for.
-        if (!notice.is_following) this.wished.clear();
+        // What was asked for has come, where this status is of after it.
+        if (!notice.is_following) for (const [id, { edits }] of this.wished) if (notice.edits >= edits) this.wished.delete(id);
         this.status = notice;
         this.tell('status');
         break;
@@ -597,10 +598,11 @@ export class App {
   /** Gives what is selected, and was added, other lengths, metres. */
   resize(size: number[]): void {
     const edits = reshaped(this.parts(), size);
+    const then = Math.max(this.status?.edits ?? 0, ...[...this.wished.values()].map(({ edits }) => edits)) + 1;
     for (const edit of edits) {
       if (!('reshape' in edit)) continue;
       const { object: id, form, matrix } = edit.reshape;
-      this.wished.set(id, { form, matrix, times: (this.wished.get(id)?.times ?? 0) + 1 });
+      this.wished.set(id, { form, matrix, times: (this.wished.get(id)?.times ?? 0) + 1, edits: then });
       this.known = this.known.map((part) => (part.id === id ? { ...part, form, matrix } : part));
     }
     this.edit(edits.length === 1 ? edits[0] : { several: edits });

@@ -563,11 +563,28 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   await picture(page, 'box');
   await field('Depth, metres', depth);
   await selected(5);
+  // What the server says meanwhile of before the change takes nothing back: the next length does not undo the last.
+  const both = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const [wide, deep, high] = app.parts()[0].form.box.size;
+    app.resize([1.5 * wide, deep, high]);
+    app.notice({ ...app.status, is_following: false });
+    const { size } = app.parts()[0].form.box;
+    app.resize([size[0], 1.5 * deep, high]);
+    return [1.5 * wide, 1.5 * deep, high];
+  });
+  (await selected(7, 2)).form.box.size.forEach((length, k) => assert.ok(Math.abs(length - both[k]) < 1e-9, `${length} instead of ${both[k]}`));
+  assert.equal(await page.evaluate(() => window.radiosity.app.wished.size), 0, 'and nothing is waited for that has come');
+  await page.locator('canvas').first().focus();
+  for (const id of [6, 5]) {
+    await page.keyboard.press('Control+z');
+    await selected(id);
+  }
 
   // A panel on the ceiling, dimmed to 20 lm and made wider: its lumens stay, and its rim.
   await page.locator('#lamp-kind').selectOption('panel');
   await page.getByRole('button', { name: 'Add a lamp' }).click();
-  const panel = await selected(6);
+  const panel = await selected(8);
   const lamp = async () => (await state(page)).lights.filter(({ deleted }) => !deleted).at(-1);
   assert.equal(panel.name, 'Panel 1');
   const ceiling = await page.evaluate(() => {
@@ -582,7 +599,7 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   await done(page, edits);
   const size = await page.evaluate(() => window.radiosity.app.parts().map(({ form }) => (form.box ?? form.rectangle).size));
   await field('Width, metres', 0.25);
-  await selected(8);
+  await selected(10);
   const wide = await lamp();
   assert.ok(Math.abs(wide.flux[1] / flux[1] - 1) < 1e-5 && Math.abs(wide.dimming - 20 / flux[1]) < 1e-6, JSON.stringify(wide));
   const wider = await page.evaluate(() => window.radiosity.app.parts().map(({ form }) => (form.box ?? form.rectangle).size));
@@ -598,7 +615,7 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   await field('Turn about the zenith, degrees', 20);
   edits += 2;
   await done(page, edits);
-  const tilted = (await state(page)).objects.find(({ id }) => id === first + 8);
+  const tilted = (await state(page)).objects.find(({ id }) => id === first + 10);
   assert.ok(Math.abs(tilted.matrix[9] + Math.cos(Math.PI / 6)) < 1e-4 && Math.abs(tilted.matrix[0] - Math.cos(Math.PI / 9)) < 1e-4, `${tilted.matrix}`);
   assert.equal(await number('Tilt about its own width, degrees').inputValue(), '30');
   await picture(page, 'panel');
