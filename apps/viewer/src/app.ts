@@ -135,6 +135,18 @@ export class App {
     this.tell('message');
   }
 
+  /** Says why something is not as it was asked for, until something else is changed. */
+  refuse(message: string): void {
+    this.refusal = message;
+    this.say(message);
+  }
+
+  /** What was refused is told no longer. */
+  forgive(): void {
+    if (this.refusal && this.message === this.refusal) this.say('');
+    this.refusal = '';
+  }
+
   // What the server says.
 
   private connected(is: boolean): void {
@@ -317,12 +329,6 @@ export class App {
     this.resting = message;
     if (wasSaid) this.say('');
     this.tell('view');
-  }
-
-  /** A refusal is told until something else is changed. */
-  private forgive(): void {
-    if (this.refusal && this.message === this.refusal) this.say('');
-    this.refusal = '';
   }
 
   /** What was refused is as before, here too. */

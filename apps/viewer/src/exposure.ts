@@ -13,6 +13,9 @@ const ADAPTATION = 180;
  *  above 0.48 of white. */
 const GLARE = 1;
 
+/** The most that exposure can be set to, either way, log2: the sun itself and starlight are within. */
+export const MOST = 30;
+
 export class Exposure {
   /** log2 of the factor from cd/m² to the display. */
   value = 0;
@@ -60,7 +63,7 @@ export class Exposure {
 
   set(value: number): void {
     this.isAutomatic = false;
-    this.value = this.wanted = Math.max(-24, Math.min(24, value));
+    this.value = this.wanted = Math.max(-MOST, Math.min(MOST, value));
     this.apply();
   }
 

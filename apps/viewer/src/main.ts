@@ -30,6 +30,8 @@ function start(): void {
   const meter = meterPanel(app);
   const panel = el('aside', { class: 'panel', 'aria-label': 'Tools' },
     viewPanel(app), meter, thingPanel(app), lightsPanel(app), gridPanel(app), camerasPanel(app));
+  // Who writes another number has read what was said of the last.
+  panel.addEventListener('change', ({ target }) => { if ((target as HTMLInputElement).type === 'number') app.say(app.resting); }, { capture: true });
   const doing = el('span', { id: 'doing' });
   // What is read out: only that the solution begins anew or is ready, and not each step of it.
   const told = el('span', { id: 'told', class: 'unseen', role: 'status' });

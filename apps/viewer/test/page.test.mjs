@@ -493,6 +493,55 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   await page.context().close();
 });
 
+test('what is not as it was asked for is told until the next number, and is not shown', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  await page.evaluate(() => {
+    const { app } = window.radiosity;
+    app.showFalseColours(true);
+    app.select([...app.objects.values()].find(({ name }) => name === 'short block').id);
+  });
+  await page.locator('#grid').evaluate((grid) => { grid.open = true; });
+  const number = (name) => page.getByRole('spinbutton', { name });
+  const write = async (name, value) => {
+    await number(name).fill(String(value));
+    await number(name).press('Enter');
+    return Number(await number(name).inputValue());
+  };
+  const message = async () => (await state(page)).message;
+  const HEIGHT = 'Height of the working plane, metres';
+  const flux = Number(await number(/^Luminous flux of/).inputValue());
+  const x = Number(await number('X, metres').inputValue());
+  // What is written, what stands there at once, what is told; and a number that is taken.
+  for (const [name, value, is, why, taken] of [
+    ['Exposure, EV', 1e9, 30, /^Exposure goes from −30 to 30 EV/, -3],
+    ['Exposure, EV', -1e9, -30, /^Exposure goes/, -3],
+    [/^Luminous flux of/, 1e9, Number((100 * flux).toPrecision(4)), /^At most 100 times what the lamp gives before it is dimmed: [\d ,.e+]+ lm/, flux],
+    [/^Dimming of .*%$/, 1e6, 1e4, /^At most 100 times/, 100],
+    [/^Dimming of .*%$/, -5, 0, /^There is no light below 0/, 100],
+    ['X, metres', 1e9, x, /far outside of the scene/, x + 0.01],
+    [/^Lower end/, 1e9, null, /^The scale goes/, 1],
+    [HEIGHT, -1, null, /0 or more/, 0.1],
+    ['Mean reflectance, percent', 150, null, /^No surface reflects more/, 20],
+  ]) {
+    const shown = await write(name, value);
+    assert.match(await message(), why);
+    if (name !== HEIGHT) assert.notEqual(shown, value);
+    if (is !== null) assert.ok(Math.abs(shown - is) <= 1e-3 * Math.abs(is), `${name}: ${shown} instead of ${is}`);
+    await write(name, taken);
+    assert.equal(await message(), '', `${name}: ${taken} is taken`);
+  }
+  // What the program refuses.
+  await write('X, metres', 3);
+  await page.waitForFunction(() => /^Not changed/.test(window.radiosity.state().message));
+  assert.equal(Number(await number('X, metres').inputValue()), x + 0.01);
+  await write('Exposure, EV', -4);
+  assert.equal(await message(), '');
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('a decimal comma is a point, typed and pasted, and arrows go on from it', async () => {
   const page = await pages.open(program.url);
   await done(page);

@@ -2,6 +2,7 @@
 import type { App } from '../app';
 import { LAMPS, type LampKind } from '../lamps';
 import { luminance } from '../luminance';
+import { readable } from '../scale';
 import type { LightNotice } from '../wire';
 import { button, el, hex, isOpen, linear, section, slider } from './parts';
 
@@ -61,19 +62,26 @@ function row(app: App, id: number): Row {
     return now;
   };
   const name = app.lightName(light());
+  /** Dims or turns up as far as lights can be; gives percent. */
+  const dim = (wanted: number, gesture?: number) => {
+    const dimming = Math.min(MOST_DIMMING, Math.max(0, wanted));
+    app.setLight(light(), { dimming }, gesture);
+    const most = MOST_DIMMING * undimmed(light());
+    if (wanted > dimming) app.refuse(`At most ${MOST_DIMMING} times what the lamp gives before it is dimmed${most > 0 ? `: ${readable(most)} ${unit}` : ''}.`);
+    if (wanted < dimming) app.refuse('There is no light below 0: it is off.');
+    return 100 * dimming;
+  };
   const on = el('input', {
     type: 'checkbox', role: 'switch', 'aria-label': `${name} on`,
     change: () => app.setLight(light(), { dimming: on.checked ? last || 1 : 0 }),
   });
-  const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%', least: 0, most: 100 * MOST_DIMMING }, (value, isLast) => {
-    app.setLight(light(), { dimming: within(value / 100) }, during(isLast));
-  });
+  const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%' }, (value, isLast) => dim(value / 100, during(isLast)));
   // Daylight is known by its lux, and what shines by its lumens.
   const [what, unit] = { sky: ['On open ground', 'lx'], object: ['All its light', 'lm'] }[light().type as string] ?? ['Across its rays', 'lx'];
   const amount = el('input', {
     type: 'number', min: 0, step: 'any', 'aria-label': unit === 'lm' ? `Luminous flux of ${name}, lumens` : `Illuminance by ${name}, lux`,
     change: () => {
-      app.setLight(light(), { dimming: within(amount.valueAsNumber / undimmed(light())) });
+      dim(amount.valueAsNumber / undimmed(light()));
       // What is too much is as much as there can be.
       app.tell('lights');
     },
@@ -114,9 +122,6 @@ function row(app: App, id: number): Row {
 
 /** As far as lights can be turned up. */
 const MOST_DIMMING = 100;
-
-/** As far as lights can be dimmed and turned up. */
-const within = (dimming: number) => Math.min(MOST_DIMMING, Math.max(0, dimming));
 
 /** Lux by daylight or lumens of what shines in its colour as it is now, before it is dimmed; 0 of other lights. */
 function undimmed({ illuminance, flux, colour }: LightNotice): number {

@@ -67,11 +67,11 @@ export function section(id: string, title: string, open: boolean, ...children: C
   return el('details', { id, open }, el('summary', {}, title), el('div', { class: 'body' }, ...children));
 }
 
-/** A slider with a number beside it. */
+/** A slider with a number beside it, in which may be written what the slider does not show. `act` says what the value is then. */
 export function slider(
   label: string,
-  { min, max, step, unit = '', least = -Infinity, most = Infinity }: { min: number; max: number; step: number; unit?: string; least?: number; most?: number },
-  act: (value: number, isLast: boolean) => void,
+  { min, max, step, unit = '' }: { min: number; max: number; step: number; unit?: string },
+  act: (value: number, isLast: boolean) => number,
 ): HTMLDivElement & { set(value: number): void } {
   const range = el('input', { type: 'range', min, max, step, 'aria-label': label, input: () => give(range, false), change: () => give(range, true) });
   const number = el('input', { type: 'number', step, 'aria-label': `${label}${unit ? `, ${unit}` : ''}`, change: () => give(number, true) });
@@ -82,12 +82,7 @@ export function slider(
     const share = (100 * (Math.min(max, Math.max(min, value)) - min)) / (max - min);
     range.style.setProperty('--share', `${share}%`);
   };
-  const give = (input: HTMLInputElement, isLast: boolean) => {
-    // What the slider does not show may be written.
-    const value = Math.min(most, Math.max(least, input.valueAsNumber));
-    act(value, isLast);
-    set(value);
-  };
+  const give = (input: HTMLInputElement, isLast: boolean) => set(act(input.valueAsNumber, isLast));
   return Object.assign(el('div', { class: 'slider' }, range, el('span', { class: 'number' }, number, unit ? el('span', { class: 'unit' }, unit) : null)), { set });
 }
 

@@ -11,6 +11,9 @@ import { button, choice, el, hex, isOpen, linear, section } from './parts';
 /** As much as a surface may reflect: with 1 in a closed room light would never end. */
 const most = (reflectance: number[]) => reflectance.map((r) => Math.min(0.99, r));
 
+/** Ways over the size of the scene that are not asked for: long before, what is moved would be too far from its middle. */
+const FAR = 10;
+
 export function thingPanel(app: App): HTMLElement {
   let gesture: number | null = null;
   const name = el('b', { class: 'title' });
@@ -35,7 +38,8 @@ export function thingPanel(app: App): HTMLElement {
     app.paint(object.id, painted);
     const reached = luminance(painted);
     // One of its bands is full before the mean is.
-    if (wanted > reached + 1e-3) app.say(`No surface reflects more than 99 % of any colour: ${(100 * reached).toFixed(0)} % is the most of this one. A paler one can have more.`);
+    if (wanted > reached + 1e-3) app.refuse(`No surface reflects more than 99 % of any colour: ${(100 * reached).toFixed(0)} % is the most of this one. A paler one can have more.`);
+    if (reflectance.valueAsNumber < 0) app.refuse('No surface reflects less than nothing: it is black.');
     show();
   };
   const places = ['X', 'Y', 'Z'].map((axis, k) => el('input', {
@@ -50,7 +54,9 @@ export function thingPanel(app: App): HTMLElement {
     if (!placed || !spot || !app.scene) return;
     if (axis !== null) {
       const way = new Vector3().setComponent(axis, places[axis].valueAsNumber - app.stage.toScene(spot).getComponent(axis));
-      if (Number.isFinite(way.lengthSq())) app.nudge(way.applyQuaternion(app.stage.root.quaternion), 0);
+      if (way.length() < FAR * app.stage.bounds.getSize(new Vector3()).length()) return app.nudge(way.applyQuaternion(app.stage.root.quaternion), 0);
+      app.refuse(`That is far outside of the scene: ${'XYZ'[axis]} is as before.`);
+      show();
     } else {
       const angle = ((turn.valueAsNumber - turnOf(placed.matrix, new Vector3(...app.scene.up))) * Math.PI) / 180;
       if (Number.isFinite(angle)) app.nudge(new Vector3(), angle);
@@ -94,6 +100,7 @@ export function thingPanel(app: App): HTMLElement {
     ['azimuth', 'Azimuth', 'Where it comes from, degrees clockwise from above: from −Z, or from +Y where +Z is up'],
   ] as const).map(([angle, name, title]) => [angle, name, number(`${name}, degrees`, title, (value) => {
     app.shineFrom(lamp()!, { ...sun(), [angle]: (value * Math.PI) / 180 });
+    if (angle === 'altitude' && Math.abs(value) > 90) app.refuse('Light stands at most 90° above the horizon, or below it.');
   })] as const);
   [angles[0][2].min, angles[0][2].max] = ['-90', '90'];
   angles[1][2].removeAttribute('min');
@@ -105,7 +112,7 @@ export function thingPanel(app: App): HTMLElement {
       const size = sizeOf(app.parts());
       size[k] = lengths[k].valueAsNumber;
       if (size[k] > 0) return app.resize(size);
-      app.say('A length is more than nothing: it is as before.');
+      app.refuse('A length is more than nothing: it is as before.');
       show();
     },
   }));

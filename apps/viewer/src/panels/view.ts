@@ -1,6 +1,7 @@
 // How the light is shown: exposure, false colours, layers.
 import { isError, type App } from '../app';
 import { CURVES, type Curve } from '../curve';
+import { MOST } from '../exposure';
 import { shared } from '../surface';
 import type { Layer } from '../wire';
 import { button, choice, el, isOpen, section, slider, toggle } from './parts';
@@ -28,7 +29,12 @@ const BOUNCES = 6;
 export function viewPanel(app: App): HTMLElement {
   const look = choice('Colours', [['eye', 'As seen', 'F2'], ['lux', 'Lux', 'F2']], (value) => app.showFalseColours(value === 'lux'));
   look.id = 'colours';
-  const exposure = slider('Exposure', { min: -16, max: 8, step: 0.1, unit: 'EV' }, (value) => app.exposure.set(value));
+  const exposure = slider('Exposure', { min: -16, max: 8, step: 0.1, unit: 'EV' }, (value) => {
+    app.forgive();
+    app.exposure.set(value);
+    if (app.exposure.value !== value) app.refuse(`Exposure goes from −${MOST} to ${MOST} EV.`);
+    return app.exposure.value;
+  });
   const curve = el('select', {
     id: 'curve', 'aria-label': 'Tone curve', title: 'Tone curve: how exposed light becomes what the display shows; the soft shoulder is that of `radiosity render`', change: () => app.setCurve(curve.value as Curve),
   }, ...CURVES.map(([value, text]) => el('option', { value }, text)));
@@ -46,7 +52,10 @@ export function viewPanel(app: App): HTMLElement {
   const setRange = () => {
     const range: [number, number] = [low.valueAsNumber, high.valueAsNumber];
     if (range[0] > 0 && range[1] > range[0]) app.exposure.setRange(range);
-    else app.say('The scale goes from a number above 0 to a larger one.');
+    else {
+      app.refuse('The scale goes from a number above 0 to a larger one: it is as before.');
+      app.tell('view');
+    }
   };
   const scale = el('div', { class: 'row scale-row' }, el('span', { class: 'quiet' }, 'Scale'), low, el('span', { class: 'quiet' }, 'to'), high, unit,
     button('Auto', () => app.exposure.setRange(null), { title: 'Fit the scale to what is seen' }));
