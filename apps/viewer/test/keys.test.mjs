@@ -27,10 +27,34 @@ test('everything is reached by keyboard alone', async () => {
   assert.ok(probe.lights.length > 0 && probe.surfaces.length > 0);
   await page.keyboard.press('g');
   assert.ok((await state(page)).grid.count > 4, 'a grid');
-  for (const key of ['F2', 'i', 'e', 't']) await page.keyboard.press(key);
+  // False colours, isolines, edges and rays: what the panel shows of them, and what is drawn.
+  const shown = () => page.evaluate(() => {
+    const { app } = window.radiosity;
+    const switches = [...document.querySelectorAll('#view [role=switch][aria-keyshortcuts]')].filter(({ ariaKeyShortcuts }) => /^[IET]$/.test(ariaKeyShortcuts));
+    const lux = document.querySelector('#colours [data-value=lux]').getAttribute('aria-checked') === 'true';
+    return [lux, ...switches.map(({ checked }) => checked), app.marks.wires.size, app.marks.lines?.visible ?? false];
+  });
+  const count = (await state(page)).objects.filter(({ deleted }) => !deleted).length;
+  const steps = [
+    ['F2', [true, false, false, false, 0, false]], ['i', [true, true, false, false, 0, false]],
+    ['e', [true, true, true, false, count, false]], ['t', [true, true, true, true, count, true]],
+    ['F2', [false, true, true, true, count, true]], ['i', [false, false, true, true, count, true]],
+    ['e', [false, false, false, true, 0, true]], ['t', [false, false, false, false, 0, false]],
+  ];
+  const pixels = () => page.locator('canvas').first().screenshot();
   await page.waitForTimeout(1500);
-  await picture(page, 'false-colours');
-  for (const key of ['F2', 'i', 'e', 't']) await page.keyboard.press(key);
+  const first = await pixels();
+  for (const [key, is] of steps) {
+    const before = await pixels();
+    await page.keyboard.press(key);
+    // Rays are asked for.
+    await page.waitForFunction((is) => is === (window.radiosity.app.marks.lines !== null), is.at(-1));
+    assert.deepEqual(await shown(), is, key);
+    await page.waitForTimeout(400);
+    if (is.every(Boolean)) await picture(page, 'false-colours');
+    assert.ok(!before.equals(await pixels()), `${key} changes the picture`);
+  }
+  assert.ok(first.equals(await pixels()), 'as before');
   await page.keyboard.press('b');
   await page.waitForFunction(() => window.radiosity.state().bookmarks.length === 1);
   await page.keyboard.press('h');
