@@ -1,11 +1,11 @@
 // All that the page knows, and what can be done with it. Panels and keys call the verbs here and listen to topics.
 import { Box3, ClampToEdgeWrapping, Matrix4, MirroredRepeatWrapping, NearestFilter, Quaternion, RepeatWrapping, SRGBColorSpace, Texture, TextureLoader, Vector3 } from 'three';
+import { Adding } from './adding';
 import { Ahead } from './ahead';
 import { keep, kept, numberOf, type Curve } from './curve';
 import { Exposure } from './exposure';
 import { Gizmo } from './gizmo';
-import { boxAhead, panelAhead, reshaped, type Shaped, tiltOf } from './forms';
-import { beside, lampAhead, namesOf, raysOf, type Lamp, type LampKind, type Sun } from './lamps';
+import { isLamp, namesOf, raysOf, type Lamp, type Sun } from './lamps';
 import { Marks } from './marks';
 import { Measuring } from './measuring';
 import { Navigator } from './navigate';
@@ -14,7 +14,7 @@ import { Stage } from './stage';
 import { Mode, shared, Surface } from './surface';
 import {
   Connection, type CameraPlace, type Edit, type Layer, type LightFrame, type LightNotice, type MeshFrame, type Notice,
-  type NewObject, type ObjectNotice, type SceneNotice, type StatusNotice, type TextureUse,
+  type ObjectNotice, type SceneNotice, type StatusNotice, type TextureUse,
 } from './wire';
 
 /** What can change. */
@@ -37,6 +37,7 @@ export class App {
   readonly gizmo = new Gizmo(this);
   readonly sight = new Sight(this);
   readonly measuring = new Measuring(this);
+  readonly adding = new Adding(this);
   readonly connection: Connection;
   scene: SceneNotice | null = null;
   /** Objects and lights as they are shown: what the server said, and what is changed here. */
@@ -59,22 +60,12 @@ export class App {
   selected: number | null = null;
   /** A light without an object that is moved. */
   selectedLight: number | null = null;
-  /** Of which kind the next lamp is that is added. */
-  lampKind: LampKind | 'panel' = 'point';
   message = '';
   private objectsAhead = new Ahead(this.objects, (object) => this.arrange(object.id));
   private lightsAhead = new Ahead(this.lights, (light) => this.shed(light));
   private listeners = new Map<Topic, (() => void)[]>();
   /** Topics that listeners are told of with the next picture. */
   private news = new Set<Topic>();
-  /** Where copies will be that were asked for: the first that comes is selected. */
-  private awaited: number[][] = [];
-  /** Forms that were asked for last and have not come, how many times others were, and how many edits there will be then. */
-  private wished = new Map<number, Shaped & { times: number; edits: number }>();
-  /** What was added and selected last. */
-  private known: (ObjectNotice & Shaped)[] = [];
-  /** Which new lamp will be selected. */
-  private awaitedLamp: ((light: LightNotice) => boolean) | null = null;
   private loosened = new Set<number>();
   private textures = new Map<string, Texture>();
   private gesture = 0;
@@ -157,7 +148,7 @@ export class App {
     if (!is) this.drop();
     if (is) {
       this.say('');
-      this.wished.clear();
+      this.adding.forget();
       this.objectsAhead.forget();
       this.lightsAhead.forget();
     }
@@ -176,8 +167,7 @@ export class App {
         break;
       }
       case 'object':
-        this.pass(notice);
-        this.welcome(notice);
+        this.adding.hearObject(notice);
         this.objectsAhead.hear(notice);
         break;
       case 'light':
@@ -186,8 +176,7 @@ export class App {
       case 'status':
         // Another page may have changed something.
         if (this.status && notice.edits !== this.status.edits) this.exposure.hold();
-        // What was asked for has come, where this status is of after it.
-        if (!notice.is_following) for (const [id, { edits }] of this.wished) if (notice.edits >= edits) this.wished.delete(id);
+        this.adding.hearStatus(notice);
         this.status = notice;
         this.tell('status');
         break;
@@ -271,6 +260,7 @@ export class App {
     if (light.type === 'sky') this.stage.dimSky(light.colour.map((band) => band * light.dimming));
     if (light.id === this.selectedLight) {
       if (light.deleted) this.selectLight(null);
+      else this.gizmo.place();
       this.tellSoon('selection');
     }
     if (light.deleted && typeof this.layer === 'object' && 'light' in this.layer && this.layer.light === light.id) this.showLayer('total');
@@ -297,27 +287,9 @@ export class App {
     return heir !== null && seen.has(heir) ? successor : heir;
   }
 
-  /** What was asked for of something that has become another since is asked for of that, if it was asked for more than once. */
-  private pass({ id, successor }: ObjectNotice): void {
-    const wished = this.wished.get(id);
-    if (!wished || successor === null) return;
-    this.wished.delete(id);
-    if (wished.times > 1) this.wished.set(successor, { ...wished, times: wished.times - 1 });
-  }
-
-  /** Whether an object is one of the copies that were asked for. */
-  private welcome(object: ObjectNotice): void {
-    if (this.objects.has(object.id)) return;
-    const at = this.awaited.findIndex((matrix) => isPlace(object.matrix, matrix));
-    if (at < 0) return;
-    this.awaited = [];
-    this.objects.set(object.id, object);
-    this.select(object.id);
-  }
-
   /** The server says how a light is; a new one that was asked for is selected. */
   private hearLight(light: LightNotice): void {
-    const isAwaited = !this.lights.has(light.id) && this.awaitedLamp?.(light);
+    const isAwaited = this.adding.isAwaited(light);
     this.lightsAhead.hear(light);
     if (isAwaited) this.selectLight(light.id);
   }
@@ -333,9 +305,7 @@ export class App {
 
   /** What was refused is as before, here too. */
   private takeBack(): void {
-    this.awaited = [];
-    this.awaitedLamp = null;
-    this.wished.clear();
+    this.adding.forget();
     this.objectsAhead.takeBack();
     this.lightsAhead.takeBack();
     for (const topic of ['objects', 'lights', 'selection'] as const) this.tell(topic);
@@ -393,6 +363,11 @@ export class App {
     };
     if (wait > 0) this.pending = { gesture, send, timer: setTimeout(send, wait) };
     else send();
+  }
+
+  /** Changes together what belongs together. */
+  editAll(edits: Edit[], gesture?: number): void {
+    if (edits.length > 0) this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
   }
 
   private drop(): void {
@@ -491,21 +466,15 @@ export class App {
   }
 
   /** A motion of the world in the scene's axes. */
-  private inScene(motion: Matrix4): Matrix4 {
+  inScene(motion: Matrix4): Matrix4 {
     const { matrixWorld } = this.stage.root;
     return matrixWorld.clone().invert().multiply(motion).multiply(matrixWorld);
   }
 
   /** Places of what is selected after a motion of the world. */
-  private placed(motion: Matrix4, from = (surface: Surface) => this.matrixOf(surface)): [Surface, Matrix4][] {
+  placed(motion: Matrix4, from = (surface: Surface) => this.adding.matrixOf(surface)): [Surface, Matrix4][] {
     const inScene = this.inScene(motion);
     return this.group().map((surface) => [surface, inScene.clone().multiply(from(surface))]);
-  }
-
-  /** Where a thing is, or will be in the form that was asked for. */
-  private matrixOf({ object, matrix }: Surface): Matrix4 {
-    const wished = this.wished.get(object);
-    return wished ? new Matrix4().fromArray(wished.matrix) : matrix;
   }
 
   /** Moves what is selected by a motion of the world, from where it is or from given places. */
@@ -516,7 +485,7 @@ export class App {
       this.objectsAhead.change(surface.object, { matrix: place });
       edits.push({ move: { object: surface.object, matrix: place } });
     }
-    if (edits.length > 0) this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
+    this.editAll(edits, gesture);
   }
 
   /** Moves by a way and turns: by an angle about the zenith, and lamps about the right of who looks, what was added about its own
@@ -531,10 +500,10 @@ export class App {
     const motion = new Matrix4().makeTranslation(way.clone().add(spot))
       .multiply(new Matrix4().makeRotationY(angle))
       .multiply(new Matrix4().makeTranslation(spot.clone().negate()));
-    const [part] = this.parts();
+    const [part] = this.adding.parts();
     if (this.selectedLight !== null) this.moveLight(this.selectedLight, motion.multiply(about(spot, right, tilt)));
     else if (!part) this.move(motion);
-    else this.move(motion.multiply(about(this.stage.toWorld(part.matrix.slice(12, 15)), this.axes(part)[0], tilt)));
+    else this.move(motion.multiply(about(this.stage.toWorld(part.matrix.slice(12, 15)), this.adding.axes(part)[0], tilt)));
   }
 
   /** About what the selected thing or lamp turns, in the world; none if it cannot be moved. */
@@ -544,7 +513,8 @@ export class App {
     return this.isMovable ? this.middle() : null;
   }
 
-  private box(): Box3 {
+  /** What is around what is selected, in the world. */
+  box(): Box3 {
     const box = new Box3();
     for (const surface of this.group()) box.union(surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld));
     return box;
@@ -556,120 +526,6 @@ export class App {
     const middle = box.getCenter(new Vector3());
     middle.y = box.min.y;
     return middle;
-  }
-
-  /** A name that nothing has yet. */
-  private newName(word: string): string {
-    const names = new Set([...this.lights.values(), ...this.objects.values()].map(({ name }) => name));
-    let number = 1;
-    while (names.has(`${word} ${number}`)) number += 1;
-    return `${word} ${number}`;
-  }
-
-  /** Adds a lamp where it is seen. */
-  addLamp(kind = this.lampKind): void {
-    if (kind === 'panel') {
-      this.addObjects(panelAhead(this.stage, this.navigator.scale, this.newName('Panel'), (id) => this.objects.get(id)?.form !== null));
-      return;
-    }
-    const light = lampAhead(this.stage, this.navigator.scale, kind, this.newName('Lamp'));
-    this.awaitedLamp = ({ name }) => name === light.name;
-    this.say(`Added: ${light.name}. It is selected.`);
-    this.edit({ add_light: { light } });
-  }
-
-  /** Adds a box where it is seen. */
-  addBox(): void {
-    this.addObjects([boxAhead(this.stage, this.navigator.scale, this.newName('Box'))]);
-  }
-
-  /** Adds what belongs together. */
-  private addObjects(objects: NewObject[]): void {
-    this.awaited = objects.map(({ matrix }) => matrix);
-    this.say(`Added: ${objects[0].name}. It is selected.`);
-    const edits = objects.map((object) => ({ add: { object } }));
-    this.edit(edits.length === 1 ? edits[0] : { several: edits });
-  }
-
-  /** What is selected if it was added, in the forms that were asked for last; nothing else. What has just become another is as it was
-   *  until that is here. */
-  parts(): (ObjectNotice & Shaped)[] {
-    const chosen = this.selected === null ? undefined : this.objects.get(this.selected);
-    if (chosen?.deleted) return this.known;
-    const objects = this.group().map(({ object }) => ({ ...this.objects.get(object)!, ...this.wished.get(object) }));
-    this.known = objects.every(({ form }) => form) ? objects : [];
-    return this.known;
-  }
-
-  /** Gives what is selected, and was added, other lengths, metres. */
-  resize(size: number[]): void {
-    const edits = reshaped(this.parts(), size);
-    const then = Math.max(this.status?.edits ?? 0, ...[...this.wished.values()].map(({ edits }) => edits)) + 1;
-    for (const edit of edits) {
-      if (!('reshape' in edit)) continue;
-      const { object: id, form, matrix } = edit.reshape;
-      this.wished.set(id, { form, matrix, times: (this.wished.get(id)?.times ?? 0) + 1, edits: then });
-      this.known = this.known.map((part) => (part.id === id ? { ...part, form, matrix } : part));
-    }
-    this.edit(edits.length === 1 ? edits[0] : { several: edits });
-  }
-
-  /** By how much what is selected, and was added, is tilted about its own x axis, radians. */
-  tilt(): number {
-    const [part] = this.parts();
-    const [x, , z] = this.axes(part);
-    return tiltOf(part.form!, x, z);
-  }
-
-  /** The axes of something in the world. */
-  private axes({ matrix }: Shaped): Vector3[] {
-    return [0, 4, 8].map((first) => new Vector3().fromArray(matrix, first).applyQuaternion(this.stage.root.quaternion).normalize());
-  }
-
-  /** The selected lamp without area, if it is one that can be placed. */
-  private lamp(): LightNotice | null {
-    const light = this.selectedLight === null ? undefined : this.lights.get(this.selectedLight);
-    return light && isLamp(light) ? light : null;
-  }
-
-  /** Whether what is selected can be duplicated and deleted. */
-  get isCopyable(): boolean {
-    return this.selected !== null || this.lamp() !== null;
-  }
-
-  private duplicateLamp({ id, matrix, position }: LightNotice): void {
-    // Parallel light has no place to be beside.
-    const way = position ? beside(this.stage, this.navigator.scale, this.stage.root.localToWorld(new Vector3().fromArray(position))) : new Vector3();
-    const motion = this.inScene(new Matrix4().makeTranslation(way));
-    const copy = motion.multiply(new Matrix4().fromArray(matrix)).toArray();
-    this.awaitedLamp = (light) => isLamp(light) && isPlace(light.matrix, copy);
-    this.say('Duplicated: the copy is selected.');
-    this.edit({ copy_light: { light: id, matrix: copy } });
-  }
-
-  duplicate(): void {
-    const lamp = this.lamp();
-    if (lamp) this.duplicateLamp(lamp);
-    if (this.group().length === 0) return;
-    // Beside the first, to the right of who looks, so that one sees that there are two.
-    const right = new Vector3(1, 0, 0).applyQuaternion(this.stage.camera.quaternion).setY(0).normalize();
-    const size = this.box().getSize(new Vector3());
-    const way = right.multiplyScalar(0.6 * Math.max(size.x, size.z));
-    const copies: Edit[] = this.placed(new Matrix4().makeTranslation(way))
-      .map(([surface, matrix]) => ({ copy: { object: surface.object, matrix: matrix.toArray() } }));
-    this.awaited = copies.map((edit) => (edit as { copy: { matrix: number[] } }).copy.matrix);
-    this.say('Duplicated: the copy is selected.');
-    this.edit(copies.length === 1 ? copies[0] : { several: copies });
-  }
-
-  delete(): void {
-    const lamp = this.lamp();
-    if (lamp) {
-      this.say(`Deleted: ${this.lightName(lamp)}. Undo brings it back.`);
-      this.edit({ delete_light: { light: lamp.id } });
-    }
-    const deletions: Edit[] = this.group().map((surface) => ({ delete: { object: surface.object } }));
-    if (deletions.length > 0) this.edit(deletions.length === 1 ? deletions[0] : { several: deletions });
   }
 
   /** Turns all lights off. */
@@ -696,8 +552,7 @@ export class App {
   }
 
   select(object: number | null): void {
-    this.awaited = [];
-    this.awaitedLamp = null;
+    this.adding.awaitNone();
     this.mark(object);
   }
 
@@ -826,16 +681,6 @@ export class App {
 /** Whether a layer shows no light, but how far it is known. */
 export function isError(layer: Layer): boolean {
   return layer === 'error' || layer === 'relative_error';
-}
-
-/** Whether a light is a lamp without area, which can be placed by itself. */
-function isLamp({ object, type }: LightNotice): boolean {
-  return object === null && type !== 'sky';
-}
-
-/** Whether a place is the one that was asked for. */
-function isPlace(matrix: number[], asked: number[]): boolean {
-  return asked.every((x, i) => Math.abs(x - matrix[i]) < 1e-9 * Math.max(1, Math.abs(x)));
 }
 
 /** A turn about an axis through a point. */

@@ -128,9 +128,9 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     p: (event) => app.selectNext(event.shiftKey ? -1 : 1),
     y: () => app.lookFreely(),
     m: () => app.gizmo.setMode(app.gizmo.mode === 'translate' ? 'rotate' : 'translate'),
-    delete: () => app.delete(),
-    backspace: () => app.delete(),
-    insert: (event) => (event.shiftKey ? app.addBox() : app.addLamp()),
+    delete: () => app.adding.delete(),
+    backspace: () => app.adding.delete(),
+    insert: (event) => (event.shiftKey ? app.adding.addBox() : app.adding.addLamp()),
     x: () => screenshot(app),
     n: () => fold(),
     h: () => help.showModal(),
@@ -149,7 +149,7 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
   };
   const size = (event: KeyboardEvent) => (event.shiftKey ? 0.1 : 1) * NUDGE * Math.min(1, app.stage.bounds.getSize(new Vector3()).length() / 5);
   const tilt = (by: number) => {
-    if (app.selectedLight === null && app.parts().length === 0) app.say('Lamps without area can be tilted, and what was added: select one first.');
+    if (app.selectedLight === null && app.adding.parts().length === 0) app.say('Lamps without area can be tilted, and what was added: select one first.');
     else app.nudge(new Vector3(), 0, by);
   };
   const angle = (event: KeyboardEvent) => ((event.shiftKey ? 0.2 : 1) * TURN * Math.PI) / 180;
@@ -167,7 +167,7 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
       if (isField && target.matches('[type=text], [type=number]') && (key === 'z' || key === 'y')) return;
       if (key === 'z') (event.shiftKey ? app.redo() : app.undo());
       else if (key === 'y') app.redo();
-      else if (key === 'd') app.duplicate();
+      else if (key === 'd') app.adding.duplicate();
       else return;
       event.preventDefault();
       return;

@@ -29,6 +29,11 @@ const CLEAR = 0.3;
 /** Share of the picture's height, from its middle, up to which a lamp is well seen. */
 const SEEN = 0.85;
 
+/** Whether a light is a lamp without area, which can be placed by itself. */
+export function isLamp({ object, type }: LightNotice): boolean {
+  return object === null && type !== 'sky';
+}
+
 /** What people call lights, by their numbers: copies have the name of the first that is there, and numbers. */
 export function namesOf(lights: Iterable<LightNotice>): Map<number, string> {
   const names = new Map<number, string>();

@@ -229,7 +229,7 @@ test('what is refused is taken back, and a copy is selected', async () => {
   assert.equal((await state(page)).message, '', 'a refusal goes with the next change');
 
   const { objects } = await state(page);
-  await page.evaluate(() => window.radiosity.app.duplicate());
+  await page.evaluate(() => window.radiosity.app.adding.duplicate());
   await page.waitForFunction((count) => window.radiosity.state().objects.length > count, objects.length);
   const now = await state(page);
   const copy = now.objects.find(({ id }) => id === now.selected);
@@ -566,15 +566,15 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   // What the server says meanwhile of before the change takes nothing back: the next length does not undo the last.
   const both = await page.evaluate(() => {
     const { app } = window.radiosity;
-    const [wide, deep, high] = app.parts()[0].form.box.size;
-    app.resize([1.5 * wide, deep, high]);
+    const [wide, deep, high] = app.adding.parts()[0].form.box.size;
+    app.adding.resize([1.5 * wide, deep, high]);
     app.notice({ ...app.status, is_following: false });
-    const { size } = app.parts()[0].form.box;
-    app.resize([size[0], 1.5 * deep, high]);
+    const { size } = app.adding.parts()[0].form.box;
+    app.adding.resize([size[0], 1.5 * deep, high]);
     return [1.5 * wide, 1.5 * deep, high];
   });
   (await selected(7, 2)).form.box.size.forEach((length, k) => assert.ok(Math.abs(length - both[k]) < 1e-9, `${length} instead of ${both[k]}`));
-  assert.equal(await page.evaluate(() => window.radiosity.app.wished.size), 0, 'and nothing is waited for that has come');
+  assert.equal(await page.evaluate(() => window.radiosity.app.adding.wished.size), 0, 'and nothing is waited for that has come');
   await page.locator('canvas').first().focus();
   for (const id of [6, 5]) {
     await page.keyboard.press('Control+z');
@@ -597,12 +597,12 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   await field('Luminous flux of Panel 1, lumens', 20);
   edits += 1;
   await done(page, edits);
-  const size = await page.evaluate(() => window.radiosity.app.parts().map(({ form }) => (form.box ?? form.rectangle).size));
+  const size = await page.evaluate(() => window.radiosity.app.adding.parts().map(({ form }) => (form.box ?? form.rectangle).size));
   await field('Width, metres', 0.25);
   await selected(10);
   const wide = await lamp();
   assert.ok(Math.abs(wide.flux[1] / flux[1] - 1) < 1e-5 && Math.abs(wide.dimming - 20 / flux[1]) < 1e-6, JSON.stringify(wide));
-  const wider = await page.evaluate(() => window.radiosity.app.parts().map(({ form }) => (form.box ?? form.rectangle).size));
+  const wider = await page.evaluate(() => window.radiosity.app.adding.parts().map(({ form }) => (form.box ?? form.rectangle).size));
   assert.ok(Math.abs(wider[1][0] - 0.25) < 1e-9 && Math.abs(wider[1][0] - wider[0][0] - (size[1][0] - size[0][0])) < 1e-9, JSON.stringify([size, wider]));
   assert.equal(await number('Luminous flux of Panel 1, lumens').inputValue(), '20');
   // Lower, and tilted by keys and to a number: away from the ceiling, whose elements are too large for what shines along them.
@@ -651,7 +651,7 @@ test('a lamp that is added is clear of walls and in the picture, wherever one st
         app.stage.camera.position.set(...eye);
         app.stage.camera.lookAt(...target);
         app.stage.camera.updateMatrixWorld();
-        app.addLamp(kind);
+        app.adding.addLamp(kind);
       }, [kind, eye, target]);
       await page.waitForFunction((count) => window.radiosity.state().lights.length > count && window.radiosity.state().selectedLight !== null, count);
       await page.waitForFunction((edits) => window.radiosity.state().status.edits > edits, edits);
@@ -781,14 +781,14 @@ test('where too many layers are looked at, the page says that its own rests, unt
         open(socket);
       };
     })));
-    app.awaited = [[1]];
+    app.adding.awaited = [[1]];
   });
   await page.waitForFunction(() => /layers of light/.test(window.radiosity.state().message));
-  assert.deepEqual(await page.evaluate(() => window.radiosity.app.awaited), [[1]]);
+  assert.deepEqual(await page.evaluate(() => window.radiosity.app.adding.awaited), [[1]]);
   assert.match(await page.locator('#resting').innerText(), /layers of light; this one stays as it is/);
   await picture(page, 'resting');
   await page.evaluate(() => {
-    window.radiosity.app.awaited = [];
+    window.radiosity.app.adding.awaited = [];
     window.others.forEach((socket) => socket.close());
   });
   await page.locator('#resting').waitFor({ state: 'hidden', timeout: 20_000 });

@@ -16,9 +16,9 @@ export function lightsPanel(app: App): HTMLElement {
     button('All on', () => app.turnOn(), { title: 'Turn all lights on; after “All off” as they were' }),
     button('All off', () => app.turnOff(), { title: 'Turn all lights off' }));
   const kind = el('select', {
-    id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.lampKind = kind.value as LampKind | 'panel'; },
+    id: 'lamp-kind', 'aria-label': 'Kind of lamp to add', change: () => { app.adding.lampKind = kind.value as LampKind | 'panel'; },
   }, ...[...LAMPS, ['panel', 'Panel']].map(([value, text]) => el('option', { value }, text)));
-  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.addLamp(), { key: 'Insert', title: 'Add a lamp where you look: 1000 lm, in rooms for people a panel of 4000 lm on the ceiling above, parallel light of 10 000 lx' }));
+  const add = el('div', { class: 'row new-lamp' }, kind, button('Add a lamp', () => app.adding.addLamp(), { key: 'Insert', title: 'Add a lamp where you look: 1000 lm, in rooms for people a panel of 4000 lm on the ceiling above, parallel light of 10 000 lx' }));
   const count = () => {
     const there = [...app.lights.values()].filter(({ deleted }) => !deleted).length;
     // While the scene comes, some may come still.

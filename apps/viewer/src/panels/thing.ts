@@ -47,8 +47,8 @@ export function thingPanel(app: App): HTMLElement {
   }));
   const turn = el('input', { type: 'number', step: 5, 'aria-label': 'Turn about the zenith, degrees', change: () => put(null) });
   const mode = choice('Handles', [['translate', 'Move', 'M'], ['rotate', 'Turn', 'M']], (value) => app.gizmo.setMode(value));
-  const copy = button('Duplicate', () => app.duplicate(), { key: 'Ctrl+D' });
-  const remove = button('Delete', () => app.delete(), { key: 'Delete', kind: 'danger' });
+  const copy = button('Duplicate', () => app.adding.duplicate(), { key: 'Ctrl+D' });
+  const remove = button('Delete', () => app.adding.delete(), { key: 'Delete', kind: 'danger' });
   const put = (axis: number | null) => {
     const [placed, spot] = [chosen(), app.spot()];
     if (!placed || !spot || !app.scene) return;
@@ -108,17 +108,17 @@ export function thingPanel(app: App): HTMLElement {
   // Lengths of what was added.
   const lengths = ['Width', 'Depth', 'Height'].map((label, k) => el('input', {
     type: 'number', min: 0, step: 0.05, 'aria-label': `${label}, metres`, title: `${label}, metres`, change: () => {
-      if (app.parts().length === 0) return;
-      const size = sizeOf(app.parts());
+      if (app.adding.parts().length === 0) return;
+      const size = sizeOf(app.adding.parts());
       size[k] = lengths[k].valueAsNumber;
-      if (size[k] > 0) return app.resize(size);
+      if (size[k] > 0) return app.adding.resize(size);
       app.refuse('A length is more than nothing: it is as before.');
       show();
     },
   }));
   const tilt = el('input', {
     type: 'number', step: 5, 'aria-label': 'Tilt about its own width, degrees', title: 'Tilt about its own width, degrees',
-    change: () => (Number.isFinite(tilt.valueAsNumber) && app.parts().length > 0 ? app.nudge(new Vector3(), 0, (tilt.valueAsNumber * Math.PI) / 180 - app.tilt()) : show()),
+    change: () => (Number.isFinite(tilt.valueAsNumber) && app.adding.parts().length > 0 ? app.nudge(new Vector3(), 0, (tilt.valueAsNumber * Math.PI) / 180 - app.adding.tilt()) : show()),
   });
   const sizing = el('div', { class: 'numbers' }, ...lengths.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'WDH'[k]), input)),
     el('label', {}, el('span', { class: 'quiet' }, 'Tilt °'), tilt));
@@ -175,7 +175,7 @@ export function thingPanel(app: App): HTMLElement {
     // The list tells the name of the whole already.
     name.hidden = name.textContent === list.selectedOptions[0]?.text;
     painting.hidden = !object;
-    copying.hidden = !app.isCopyable;
+    copying.hidden = !app.adding.isCopyable;
     if (object) {
       if (!isOpen(paint)) paint.value = hex(object.reflectance);
       if (!isOpen(reflectance)) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
@@ -185,10 +185,10 @@ export function thingPanel(app: App): HTMLElement {
       const now = sun();
       for (const [angle, , input] of angles) if (!isOpen(input)) input.value = String(Number(((now[angle] * 180) / Math.PI).toFixed(1)));
     }
-    const parts = app.parts();
+    const parts = app.adding.parts();
     const size = parts.length > 0 ? sizeOf(parts) : [];
     sizing.hidden = size.length === 0;
-    if (!sizing.hidden && !isOpen(tilt)) tilt.value = String(Math.round((1800 * app.tilt()) / Math.PI) / 10 || 0);
+    if (!sizing.hidden && !isOpen(tilt)) tilt.value = String(Math.round((1800 * app.adding.tilt()) / Math.PI) / 10 || 0);
     lengths.forEach((input, k) => {
       input.parentElement!.hidden = k >= size.length;
       if (!isOpen(input) && k < size.length) input.value = String(Number(size[k].toPrecision(4)));
@@ -222,6 +222,6 @@ export function thingPanel(app: App): HTMLElement {
   app.on('selection', show);
   app.on('objects', show);
   app.on('lights', offer);
-  const add = button('Add a box', () => app.addBox(), { key: 'Shift+Insert', title: 'Add a box, half a metre wide in rooms for people, below the middle of the picture' });
+  const add = button('Add a box', () => app.adding.addBox(), { key: 'Shift+Insert', title: 'Add a box, half a metre wide in rooms for people, below the middle of the picture' });
   return section('thing', 'Selected', true, el('div', { class: 'row' }, list, add), none, body);
 }
