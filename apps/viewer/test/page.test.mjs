@@ -423,6 +423,31 @@ test('while the scene comes it is not said to have no light, and thousands of li
   await page.context().close();
 });
 
+test('objects that come together are marked once, with what is selected and edges shown', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const counts = await page.evaluate(async () => {
+    const { app } = window.radiosity;
+    const [object] = app.objects.values();
+    app.select(object.id);
+    app.showEdges(true);
+    const counts = { outline: 0, edges: 0 };
+    for (const name of ['outline', 'edges']) {
+      const mark = app.marks[name].bind(app.marks);
+      app.marks[name] = (surfaces) => {
+        counts[name] += 1;
+        mark(surfaces);
+      };
+    }
+    for (let time = 0; time < 500; time += 1) app.objectsAhead.hear({ ...object });
+    await new Promise((done) => { setTimeout(done, 500); });
+    return counts;
+  });
+  assert.ok(counts.outline >= 1 && counts.outline < 5 && counts.edges >= 1 && counts.edges < 5, JSON.stringify(counts));
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('two pages see the same, and one that lost its connection catches up', async () => {
   const [one, two] = await Promise.all([pages.open(program.url), pages.open(program.url)]);
   await Promise.all([done(one), done(two)]);
