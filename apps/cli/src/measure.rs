@@ -6,7 +6,8 @@ use crate::progress::Progress;
 use crate::report::ErrorReport;
 use crate::{Failure, Global};
 use clap::Args;
-use radiosity::{Tracer, counted, luminance};
+use glam::DVec3;
+use radiosity::{Scene, Tracer, counted, luminance};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -34,6 +35,25 @@ fn cell(text: &str) -> String {
     if text.contains([',', '"']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
+/// Points beyond the scene by more than this part of its extent are outside of it: sensors on a façade are not.
+const BESIDE: f64 = 0.1;
+
+/// What is said of points that lie outside the scene.
+fn strays(scene: &Scene, places: &[(DVec3, DVec3)]) -> Option<String> {
+    let [low, high] = scene.bounding_box()?;
+    let beside = BESIDE * (high - low).max_element();
+    let is_outside = |p: &DVec3| p.cmplt(low - beside).any() || p.cmpgt(high + beside).any();
+    let outside = places.iter().filter(|(p, _)| is_outside(p)).count();
+    let [low, high] = [low, high].map(|p| format!("({:.4}, {:.4}, {:.4})", p.x, p.y, p.z));
+    (outside > 0).then(|| {
+        format!(
+            "warning: {outside} of {} lie outside the scene, which reaches from {low} to {high} m (are they in its axes and \
+             unit? Of an .obj --up and --unit say which those are; a .glb is in metres, with y up)",
+            counted(places.len(), "point", "points")
+        )
+    })
+}
+
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let mut inputs = arguments.scene.files();
@@ -51,6 +71,9 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let tracer = Tracer::new(&input.scene, &input.mesh);
     let places: Vec<_> = points.iter().map(|p| (p.position, p.normal)).collect();
     progress.parts();
+    if let Some(warning) = strays(&input.scene, &places) {
+        progress.say(&warning);
+    }
     arguments.solve.warn_of_methods(progress);
     progress.limit(arguments.solve.time);
     let measured = radiosity::measure(&tracer, &places, &arguments.solve.measure(), progress)?;

@@ -51,7 +51,7 @@ export function cover(app: App, grid: Grid, picked: Vector3): void {
 function leaves(surfaces: Surface[], from: Vector3, way: Vector3): number {
   let count = 0;
   for (const surface of surfaces) {
-    const ray = new Ray(from, way).applyMatrix4(surface.matrixWorld.clone().invert());
+    const ray = new Ray(from.clone(), way.clone()).applyMatrix4(surface.matrixWorld.clone().invert());
     for (const { face, faceIndex } of surface.tree.raycast(ray, DoubleSide)) {
       if (faceIndex! < surface.fronts) count += Math.sign(face!.normal.dot(ray.direction));
     }

@@ -138,6 +138,8 @@ export interface PlaneAnswer {
   uniformity: number;
   /** Points that are left out, as they are within things. */
   covered: number;
+  /** Points that are left out, as they lie in the zone along walls. */
+  walled: number;
   /** Standard error of a point by its rays, over the mean. */
   error: number;
   /** Edits that are in it. */

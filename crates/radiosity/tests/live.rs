@@ -701,7 +701,8 @@ fn what_has_its_first_rays_alone_can_be_read() {
         let own = applied.added.first().copied().unwrap_or(block);
         while !session.step(Duration::ZERO).is_complete {}
         assert!(!session.status().is_done, "{edit:?}: more rays follow");
-        let layers = [Layer::Direct, Layer::Indirect, Layer::Bounce(1), Layer::Bounce(3), Layer::Error, Layer::RelativeError];
+        let layers =
+            [Layer::Direct, Layer::Indirect, Layer::Bounce(1), Layer::Bounce(3), Layer::Error, Layer::RelativeError];
         for layer in layers {
             let light = session.light(own, layer);
             assert!(!light.is_empty() && light.iter().flatten().all(|x| x.is_finite()), "{layer:?} after {edit:?}");

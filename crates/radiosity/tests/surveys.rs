@@ -108,7 +108,8 @@ fn the_error_in_sight_is_without_the_noise_of_its_readings() {
     let camera = |eye: DVec3, way: DVec3, up: DVec3| {
         let back = -way.normalize();
         let right = up.cross(back).normalize();
-        DMat4::from(DAffine3::from_mat3_translation(DMat3::from_cols(right, back.cross(right), back), eye)).to_cols_array()
+        DMat4::from(DAffine3::from_mat3_translation(DMat3::from_cols(right, back.cross(right), back), eye))
+            .to_cols_array()
     };
     let middle = 0.5 * (low + high);
     let ceiling = camera(middle, DVec3::Y, DVec3::X);

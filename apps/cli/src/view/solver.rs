@@ -98,7 +98,7 @@ struct Asked {
 
 /// What is measured at many points.
 enum Measured {
-    Plane(Plane),
+    Plane(Box<Plane>),
     /// A grid over a surface.
     Places(Survey),
     /// Places all over what a camera sees.
@@ -220,7 +220,7 @@ impl Solver {
     fn obey(&mut self, command: Command, since: Instant) -> bool {
         match command {
             Command::Ask { page, request: Request::Plane { question, about }, answer } => {
-                self.ask(Asked { page, question, what: Measured::Plane(Plane::new(about)), answer });
+                self.ask(Asked { page, question, what: Measured::Plane(Box::new(Plane::new(about))), answer });
             }
             Command::Ask { page, request: Request::Survey { question, object, places }, answer } => {
                 let place = |(triangle, v, w)| SurfacePlace { object, triangle, uv: [v, w] };

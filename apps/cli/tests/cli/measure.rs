@@ -35,6 +35,16 @@ fn measure_answers_on_standard_output_or_in_a_file() {
     assert!(result["error"]["upper_95_one_sided"].as_f64().unwrap() <= 0.2);
 }
 
+/// Points in other axes or another unit than the scene: there is light nowhere, and the reason is told.
+#[test]
+fn points_outside_the_scene_are_told() {
+    let room = Room::new("measure-outside");
+    room.write("p.csv", "x,y,z,nx,ny,nz\n0.1,0,0.05,0,1,0\n0.3,-0.6,0,0,0,1\n300,0,100,0,1,0\n");
+    let run = room.run(["measure", "--points", "p.csv", "--error", "20%"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert!(run.err.contains("warning: 2 of 3 points lie outside the scene"), "{}", run.err);
+}
+
 /// Classic methods and solvers by their names give the light that rays give.
 #[test]
 fn classic_methods_and_solvers_by_name() {

@@ -55,8 +55,11 @@ export function gridPanel(app: App): HTMLElement {
   const [height, border] = [length('Height of the working plane'), length('Zone along walls that is left out')];
   const set = () => {
     const lengths = [height, border].map((input) => input.valueAsNumber);
-    if (lengths.every((metres) => metres >= 0)) app.measuring.setPlane(lengths[0], lengths[1]);
-    else app.say('Height and zone are metres, 0 or more.');
+    if (lengths.every((metres) => metres >= 0 && metres <= 1000)) app.measuring.setPlane(lengths[0], lengths[1]);
+    else {
+      app.refuse('Height and zone are metres, 0 or more and at most 1000.');
+      app.tell('grid');
+    }
   };
   const field = (label: string, input: HTMLElement) =>
     el('label', { class: 'row' }, el('span', { class: 'quiet' }, label), el('span', { class: 'grow' }), input, el('span', { class: 'unit' }, 'm'));
@@ -88,6 +91,7 @@ export function gridPanel(app: App): HTMLElement {
       fact('Uniformity', uniformity.toFixed(2)),
       fact('Points', String(grid ? points.length - covered : points.length)),
       ...(covered > 0 ? [fact('Covered, left out', String(covered))] : []),
+      ...(answer?.walled ? [fact('Along walls and what is high or fixed, left out', String(answer.walled))] : []),
       ...(noise === undefined ? [] : [fact('Noise of a point', `± ${(100 * noise).toPrecision(2)} %`)]),
       fact('Cells', metres(cell) + (isCoarse ? ', coarser than the standard' : '')),
       fact(answer ? 'Plane' : 'Surface', metres(size)),

@@ -130,6 +130,9 @@ pub struct PlaneFigures {
     pub uniformity: f32,
     /// Points that are left out as they are within things.
     pub covered: usize,
+    /// Points above the surface that are left out as they lie in the zone along walls; things of 2 m, and what cannot be moved, are
+    /// walls.
+    pub walled: usize,
     /// One standard error of a point, in the root mean square, over the mean: by rays alone, the elements' size is not in it.
     pub error: f32,
 }
@@ -147,8 +150,10 @@ pub struct Plane {
 /// A cell's middle, once it has been looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Cell {
-    /// Not above the surface, or at a wall.
+    /// Not above the surface.
     Outside,
+    /// In the zone along a wall, or above a ceiling.
+    Walled,
     /// Within a thing: there is no light, but the room goes on behind it.
     Inside,
     /// To be measured, by the halves of its rays.
@@ -321,7 +326,7 @@ impl Session {
             self.is_walled(layout, beside, end)
         });
         if is_near_wall || self.is_walled(layout, layout.point(at, 0.0), point) {
-            return Cell::Outside;
+            return Cell::Walled;
         }
         // Where rays begin: a point on a table is not inside it.
         let origin = point + world.offset * layout.normal;
@@ -345,7 +350,7 @@ impl Session {
 
         // From the nearest cell that is seen from there, over all to which no wall bars the way.
         let seen = |at: DVec2| layout.point(at, height.max(SKIRTING));
-        let open = |cell: usize| plane.cells[cell] != Cell::Outside;
+        let open = |cell: usize| !matches!(plane.cells[cell], Cell::Outside | Cell::Walled);
         let far = |cell: &usize| layout.middle(*cell).distance_squared(picked);
         let mut near: Vec<usize> = (0..plane.cells.len()).filter(|cell| open(*cell)).collect();
         near.sort_by(|a, b| far(a).total_cmp(&far(b)));
@@ -404,6 +409,7 @@ impl Session {
             most: points.iter().map(|point| point.lux).fold(0.0, f32::max),
             uniformity: over(f64::from(least)),
             covered,
+            walled: plane.cells.iter().filter(|cell| **cell == Cell::Walled).count(),
             error: over(square.sqrt()),
         };
         Ok(PlaneReading { points, figures })

@@ -161,8 +161,8 @@ impl<const W: usize> Solve<W> {
         let is_open: [bool; W] = std::array::from_fn(|k| k / 3 < columns && !self.has_ended[k / 3]);
         let lanes = self.h.par_iter_mut().zip(&self.gathered).zip(&self.d).with_min_len(4096);
         lanes.for_each(|((h, gathered), d)| {
-            for k in 0..W {
-                h.0[k] = if is_open[k] { gathered.0[k] + d.0[k] } else { h.0[k] };
+            for (k, is_open) in is_open.iter().enumerate() {
+                h.0[k] = if *is_open { gathered.0[k] + d.0[k] } else { h.0[k] };
             }
         });
         answer.respond(&self.e, &self.h, &mut self.gathered);

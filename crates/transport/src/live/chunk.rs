@@ -163,12 +163,7 @@ impl<'a> Dirt<'a> {
     /// Of some changes. Only the first of each object counts: rays that have not seen it are of the world before it, and
     /// where the object is now it tells itself.
     pub fn new(world: &'a World, changes: &[Change]) -> Dirt<'a> {
-        let mut dirt = Dirt {
-            bodies: Vec::new(),
-            before: Vec::new(),
-            now: Vec::new(),
-            ids: (0, 0),
-        };
+        let mut dirt = Dirt { bodies: Vec::new(), before: Vec::new(), now: Vec::new(), ids: (0, 0) };
         let margin = 4.0 * world.offset;
         let around = |bounds: Bounds| {
             let (centre, radius) = bounds.ball();
@@ -505,14 +500,14 @@ impl Chunk {
             work.strata[part as usize].rays(&cells, &sequence, |m| {
                 let Some(place) = m.checked_sub(known.start).filter(|_| m < known.end) else { return };
                 let is_traced = lost[place as usize / 64] >> (place % 64) & 1 == 1;
-                let [u, v] = sequence.pair(m);
-                let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-                if is_traced || !cones.iter().any(|cone| cone.has(direction)) {
-                    return;
-                }
                 let at = self.at(e, m);
                 let key = self.keys[at.0][at.1];
-                if f64::from(key) + margin < nearest {
+                if is_traced || f64::from(key) + margin < nearest {
+                    return;
+                }
+                let [u, v] = sequence.pair(m);
+                let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+                if !cones.iter().any(|cone| cone.has(direction)) {
                     return;
                 }
                 let (ray, salt) = shoot_to(world, &site, (&sequence, seed), direction, m);
