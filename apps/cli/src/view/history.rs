@@ -28,12 +28,11 @@ impl History {
     /// A change was made; `inverse` takes it back.
     pub fn did(&mut self, label: String, inverse: Edit, gesture: Option<Gesture>) {
         self.undone.clear();
-        let goes_on = |last: &Change| last.gesture.is_some() && last.gesture == gesture;
-        if let Some(last) = self.done.last().filter(|last| goes_on(last)) {
-            // The first inverse leads back to before the gesture.
-            if targets(&last.edit) == targets(&inverse) {
-                return;
-            }
+        // The first inverse leads back to before the gesture. Gestures of other pages may go on beside it.
+        let mut going_on = self.done.iter().rev().take_while(|change| change.gesture.is_some());
+        let is_known = |of: &Change| of.gesture == gesture && targets(&of.edit) == targets(&inverse);
+        if gesture.is_some() && going_on.any(is_known) {
+            return;
         }
         if self.done.len() == LONGEST {
             self.done.remove(0);
@@ -197,6 +196,26 @@ mod tests {
         history.redid(dim(0, 0.8));
         history.did("dim b".into(), dim(1, 1.0), None);
         assert_eq!(history.next_redo(), None, "what was undone is gone after a new change");
+    }
+
+    #[test]
+    fn gestures_of_two_pages_at_once_are_a_change_each() {
+        let mut history = History::default();
+        for step in 0..10 {
+            for page in 0..2 {
+                let was = 1.0 - 0.1 * step as f32;
+                history.did("dim".into(), dim(page, was), Some((page.into(), 7)));
+            }
+        }
+        history.undid(dim(1, 0.0));
+        assert_eq!(history.next_undo(), Some(&dim(0, 1.0)));
+        history.undid(dim(0, 0.0));
+        assert_eq!(history.next_undo(), None);
+        // A change that is none of a gesture ends them.
+        history.did("dim".into(), dim(0, 1.0), Some((0, 8)));
+        history.did("dim".into(), dim(1, 1.0), None);
+        history.did("dim".into(), dim(0, 0.5), Some((0, 8)));
+        assert_eq!(history.next_undo(), Some(&dim(0, 0.5)));
     }
 
     #[test]

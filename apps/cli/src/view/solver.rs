@@ -4,8 +4,8 @@ use super::board::{Board, Notice, Subject};
 use super::history::{self, Gesture, History, targets};
 use super::wire::{self, CameraPlace, PlaneAnswer, ProbeAnswer, Refused, Request, Say, Share};
 use radiosity::session::{
-    Edit, EditError, Layer, LightKind, Model, ObjectId, Plane, PlaneError, PlaneReading, Probe, Reading, Session,
-    SurfacePlace, Survey, Surveyed,
+    Edit, EditError, Layer, LightKind, Model, ModelLight, ModelObject, ObjectId, Plane, PlaneError, PlaneReading,
+    Probe, Reading, Session, SurfacePlace, Survey, Surveyed,
 };
 use radiosity::{Bands, Scene, luminance};
 use std::collections::BTreeSet;
@@ -74,9 +74,9 @@ pub struct Solver {
     edits: u64,
     /// When the first edit came whose light is not yet posted.
     edited: Option<Instant>,
-    /// The last edit of a gesture that goes on, and when it came: it waits until what was made before is seen, or nothing
-    /// would be seen before the gesture ends.
-    held: Option<(Command, Instant)>,
+    /// The last edit of each page's gesture that goes on: these wait until what was made before is seen, or nothing would
+    /// be seen before the gestures end.
+    held: Vec<Held>,
     latency: Option<f64>,
     /// What pages wait for that takes its time: of each page one of a kind at most.
     measured: Vec<Asked>,
@@ -128,13 +128,38 @@ struct Shown {
     last: Option<(Instant, Duration)>,
 }
 
+/// An edit that waits.
+struct Held {
+    command: Command,
+    since: Instant,
+    of: Part,
+}
+
 /// What an edit of a gesture changes; one that changes the same makes it outdated.
-fn gesture(command: &Command) -> Option<(u64, u64, Vec<history::Target>)> {
-    match command {
-        Command::Ask { page, request: Request::Edit { edit, gesture: Some(gesture) }, .. } => {
-            (!history::adds(edit)).then(|| (*page, *gesture, targets(edit)))
+#[derive(PartialEq)]
+struct Part {
+    page: u64,
+    gesture: u64,
+    targets: Vec<history::Target>,
+}
+
+impl Part {
+    fn of(command: &Command) -> Option<Part> {
+        match command {
+            Command::Ask { page, request: Request::Edit { edit, gesture: Some(gesture) }, .. } => {
+                (!history::adds(edit)).then(|| Part { page: *page, gesture: *gesture, targets: targets(edit) })
+            }
+            _ => None,
         }
-        _ => None,
+    }
+}
+
+/// Whether the scene has to be as was asked for before: not for who only looks.
+fn needs_all(command: &Command) -> bool {
+    match command {
+        Command::Ask { request, .. } => matches!(request, Request::Edit { .. } | Request::Undo {} | Request::Redo {}),
+        Command::Export(_) | Command::Stop => true,
+        Command::Watch => false,
     }
 }
 
@@ -154,7 +179,7 @@ impl Solver {
             is_done: false,
             edits: 0,
             edited: None,
-            held: None,
+            held: Vec::new(),
             latency: None,
             measured: Vec::new(),
             since: (Instant::now(), 0),
@@ -170,7 +195,7 @@ impl Solver {
     pub fn run(mut self, mut commands: mpsc::Receiver<Command>) {
         loop {
             let mut waiting: Vec<Command> = Vec::new();
-            if self.is_done && self.held.is_none() && self.measured.is_empty() {
+            if self.is_done && self.held.is_empty() && self.measured.is_empty() {
                 match commands.blocking_recv() {
                     Some(command) => waiting.push(command),
                     None => return,
@@ -190,7 +215,7 @@ impl Solver {
             self.turn();
             // Nothing wakes this thread when a page reads its answers.
             let is_stuck = !self.measured.is_empty() && self.measured.iter().all(Asked::is_full);
-            if is_stuck && self.is_done && self.held.is_none() {
+            if is_stuck && self.is_done && self.held.is_empty() {
                 std::thread::sleep(SLICE);
             }
         }
@@ -198,22 +223,22 @@ impl Solver {
 
     /// Does what is asked, at once or, of a gesture that goes on, when the last picture is there; whether to go on.
     fn take(&mut self, command: Command) -> bool {
-        let Some(of) = gesture(&command) else { return self.release() && self.obey(command, Instant::now()) };
-        let is_same = self.held.as_ref().is_some_and(|(held, _)| gesture(held) == Some(of));
-        if !is_same && !self.release() {
-            return false;
+        let Some(of) = Part::of(&command) else {
+            return (!needs_all(&command) || self.release()) && self.obey(command, Instant::now());
+        };
+        if let Some(held) = self.held.iter_mut().find(|held| held.of == of) {
+            held.command = command;
+            return true;
         }
-        let since = self.held.take().map_or_else(Instant::now, |(_, since)| since);
-        self.held = Some((command, since));
-        true
+        // A page's own edits are made in its order; what others drag waits for the picture as before.
+        let of_page = self.held.iter().position(|held| held.of.page == of.page).map(|place| self.held.remove(place));
+        self.held.push(Held { command, since: Instant::now(), of });
+        of_page.is_none_or(|held| self.obey(held.command, held.since))
     }
 
-    /// Makes the edit that waits; whether to go on.
+    /// Makes the edits that wait; whether to go on.
     fn release(&mut self) -> bool {
-        match self.held.take() {
-            Some((command, since)) => self.obey(command, since),
-            None => true,
-        }
+        std::mem::take(&mut self.held).into_iter().all(|held| self.obey(held.command, held.since))
     }
 
     /// Does what was asked at a time; whether to go on.
@@ -421,25 +446,38 @@ impl Solver {
         }
         .text();
         self.say(Subject::Scene, text);
-        self.post_model();
+        for object in &self.model.objects {
+            self.post_mesh(object);
+            self.post_object(object);
+            self.changed.insert(object.id);
+        }
+        self.model.lights.iter().for_each(|light| self.post_lamp(light));
         self.post_cameras();
         self.post_history();
     }
 
-    /// Objects and lights; the board knows which of them are news.
+    /// What is new of objects and lights.
     fn post_model(&mut self) {
-        let known = if self.last_post.is_some() { self.model.objects.len() } else { 0 };
-        self.session.update_model(&mut self.model);
-        for (index, object) in self.model.objects.iter().enumerate() {
-            if index >= known {
-                self.board.post(Subject::Mesh(object.id.0), Notice::Binary(wire::mesh(object, self.session.scene())));
-                self.changed.insert(object.id);
-            }
-            self.say(Subject::Object(object.id.0), wire::object(object, self.session.scene()));
-        }
-        for light in &self.model.lights {
-            self.say(Subject::Light(light.id.0), wire::light(light));
-        }
+        let known = self.model.objects.len();
+        let (objects, lights) = self.session.update_model(&mut self.model);
+        let added = self.model.objects[known..].iter();
+        self.changed.extend(added.clone().map(|object| object.id));
+        added.for_each(|object| self.post_mesh(object));
+        objects.into_iter().for_each(|id| self.post_object(&self.model.objects[id.0 as usize]));
+        lights.into_iter().for_each(|id| self.post_lamp(&self.model.lights[id.0 as usize]));
+    }
+
+    fn post_mesh(&self, object: &ModelObject) {
+        let mesh = wire::mesh(object, self.session.scene());
+        self.board.post(Subject::Mesh(object.id.0), Notice::Binary(mesh));
+    }
+
+    fn post_object(&self, object: &ModelObject) {
+        self.say(Subject::Object(object.id.0), wire::object(object, self.session.scene()));
+    }
+
+    fn post_lamp(&self, light: &ModelLight) {
+        self.say(Subject::Light(light.id.0), wire::light(light));
     }
 
     fn post_cameras(&self) {
@@ -636,6 +674,35 @@ fn not_kept(why: &str) -> String {
 mod tests {
     use super::*;
     use radiosity::session::{PlaneQuestion, SessionOptions};
+
+    /// Of what two pages drag only the latest waits, each page's own, whatever else they look at meanwhile; an undo comes after.
+    #[test]
+    fn drags_of_two_pages_wait_side_by_side() {
+        let options = SessionOptions { elements: 200, rays: 16, ..SessionOptions::default() };
+        let session = Session::new(radiosity::cornell_box(), &options).unwrap();
+        let mut solver = Solver::new(session, None, Arc::new(Board::new()));
+        let blocks = solver.model.objects.iter().filter(|object| object.name.contains("block"));
+        let blocks: Vec<ObjectId> = blocks.map(|object| object.id).take(2).collect();
+        let (answer, _answers) = mpsc::channel(1);
+        let ask = |page: u64, request: Request| Command::Ask { page, request, answer: answer.clone() };
+        let moved = |page: u64, step: u32| {
+            let matrix = glam::DMat4::from_translation(glam::DVec3::X * f64::from(step) * 1e-3).to_cols_array();
+            let edit = Edit::Move { object: blocks[page as usize], matrix };
+            ask(page, Request::Edit { edit, gesture: Some(1) })
+        };
+        for step in 1..=20 {
+            for page in 0..2 {
+                assert!(solver.take(moved(page, step)));
+                let rays = Request::Rays { question: 1, object: blocks[0], triangle: 0 };
+                assert!(solver.take(ask(page, rays)));
+            }
+        }
+        assert_eq!((solver.held.len(), solver.edits), (2, 0));
+        assert!(solver.take(ask(1, Request::Undo {})));
+        assert_eq!((solver.held.len(), solver.edits), (0, 3));
+        let x = |object: ObjectId| solver.model.objects[object.0 as usize].matrix[12];
+        assert_eq!(blocks.iter().map(|block| x(*block)).collect::<Vec<_>>(), [0.02, 0.0]);
+    }
 
     /// A page that has not read other answers gets its plane when it has; meanwhile other pages get theirs.
     #[test]

@@ -57,8 +57,12 @@ impl Session {
         model
     }
 
-    /// Brings a model of this session up to date. Triangles, which stay as they are, are made for new objects alone.
-    pub fn update_model(&self, model: &mut Model) {
+    /// Brings a model of this session up to date; which objects and lights are new or others than they were. Triangles, which
+    /// stay as they are, are made for new objects alone.
+    pub fn update_model(&self, model: &mut Model) -> (Vec<ObjectId>, Vec<LightId>) {
+        let state = |o: &ModelObject| (o.matrix, o.reflectance, o.tint, o.emission, o.deleted, o.successor, o.light);
+        let known = model.objects.len();
+        let mut changed = Vec::new();
         let world = self.live.world();
         let mut bounds: Option<[glam::DVec3; 2]> = None;
         for (index, (placed, body)) in self.objects.iter().zip(&world.bodies).enumerate() {
@@ -106,17 +110,24 @@ impl Session {
                     light: None,
                 });
             }
-            let known = &mut model.objects[index];
-            known.matrix = placed.matrix;
-            known.reflectance = placed.coat.unwrap_or(placed.paint.mean);
-            known.tint = std::array::from_fn(|band| base[band] * scale[band]);
-            known.emission = std::array::from_fn(|band| mean[band] * factor[band]);
-            known.deleted = !body.is_present;
-            known.successor = placed.successor.map(|successor| ObjectId(successor as u32));
-            known.light = placed.light.map(|light| LightId(light as u32));
+            let object = &mut model.objects[index];
+            let before = state(object);
+            object.matrix = placed.matrix;
+            object.reflectance = placed.coat.unwrap_or(placed.paint.mean);
+            object.tint = std::array::from_fn(|band| base[band] * scale[band]);
+            object.emission = std::array::from_fn(|band| mean[band] * factor[band]);
+            object.deleted = !body.is_present;
+            object.successor = placed.successor.map(|successor| ObjectId(successor as u32));
+            object.light = placed.light.map(|light| LightId(light as u32));
+            if index >= known || state(object) != before {
+                changed.push(object.id);
+            }
         }
-        model.lights = self.model_lights();
+        let before = std::mem::replace(&mut model.lights, self.model_lights());
+        let lights = model.lights.iter().filter(|light| before.get(light.id.0 as usize) != Some(light));
+        let lights = lights.map(|light| light.id).collect();
         model.bounds = bounds.unwrap_or([world.middle; 2]).map(|corner| corner.to_array());
+        (changed, lights)
     }
 
     fn model_lights(&self) -> Vec<ModelLight> {
