@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { compared, difference, done, folder, luxOf, NEAR, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, NEAR, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
 import { shown } from './display.mjs';
 import { studio } from './studio.mjs';
 
@@ -83,6 +83,56 @@ test('a thing is dragged, and light follows while it is and as a batch solve has
   await restored(page);
   assert.deepEqual(page.faults, []);
   await page.context().close();
+});
+
+test('two pages drag a thing each at once, one loses its connection meanwhile, and both have the light of both', async () => {
+  const [one, two] = [await pages.open(program.url), await pages.open(program.url)];
+  await Promise.all([done(one), done(two)]);
+  const { edits } = (await state(one)).status;
+  const hands = await Promise.all([[one, 'short block', 5], [two, 'tall block', 1.5]].map(async ([page, name, pace]) => {
+    const { id } = await named(page, name);
+    await page.evaluate((id) => window.radiosity.app.select(id), id);
+    await page.waitForTimeout(300);
+    const [x, y] = await handle(page);
+    await page.mouse.move(x, y);
+    await page.waitForTimeout(100);
+    await page.mouse.down();
+    return { page, name, x, y, pace };
+  }));
+  const drag = async (steps) => {
+    for (const step of steps) {
+      for (const { page, x, y, pace } of hands) await page.mouse.move(x - pace * step, y);
+      await one.waitForTimeout(30);
+    }
+  };
+  await drag([1, 2, 3, 4, 5]);
+  // Both are followed while both are held, on both pages.
+  const matrices = (page) => Promise.all(hands.map(async ({ name }) => (await named(page, name)).matrix[12]));
+  for (const page of [one, two]) {
+    await page.waitForFunction(() => window.radiosity.state().objects.filter((object) => object.name.includes('block')).every((object) => Math.abs(object.matrix[12]) > 0.005));
+  }
+  await two.context().setOffline(true);
+  await two.evaluate(() => window.radiosity.app.connection.drop());
+  await two.waitForFunction(() => !window.radiosity.state().isConnected);
+  await drag([6, 7, 8]);
+  await two.context().setOffline(false);
+  await caughtUp(two);
+  await drag([9, 10]);
+  for (const { page } of hands) await page.mouse.up();
+  await Promise.all([done(one, edits + 2), done(two, edits + 2)]);
+  const places = await matrices(one);
+  assert.deepEqual(await matrices(two), places);
+  assert.ok(places.every((x) => Math.abs(x) > 0.02), `${places}`);
+  const before = await luxOf(one, 80);
+  assert.deepEqual(await luxOf(two, before.points), before);
+  const off = await compared(one);
+  console.log(`two things dragged by ${places.map((x) => x.toFixed(2)).join(' and ')} m at once: ${(100 * off).toFixed(1)} % from a batch solve`);
+  assert.ok(off < NEAR, `${off}`);
+  // Of the page that stayed it is one change, however the other's lay between.
+  await restored(one);
+  assert.deepEqual(await matrices(two), [0, 0]);
+  assert.deepEqual([one.faults, two.faults.filter((fault) => !fault.includes('ERR_INTERNET_DISCONNECTED'))], [[], []]);
+  await Promise.all([one.context().close(), two.context().close()]);
 });
 
 test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a batch solve has it', async () => {

@@ -670,6 +670,37 @@ test('without the token, and from elsewhere, there is no page', async () => {
   await page.context().close();
 });
 
+/** The mean illuminance of the surfaces of a lit model, whose nodes leave its vertices where they are, lx. */
+const meanLux = (bytes) => {
+  const file = Buffer.from(bytes);
+  const length = file.readUInt32LE(12);
+  const gltf = JSON.parse(file.subarray(20, 20 + length).toString());
+  const data = file.subarray(28 + length);
+  const read = (accessor, size, next) => {
+    const { bufferView, byteOffset = 0, count } = gltf.accessors[accessor];
+    const { byteOffset: first = 0, byteStride = 4 * size } = gltf.bufferViews[bufferView];
+    return Array.from({ length: count }, (_, i) => Array.from({ length: size }, (_, k) => next(first + byteOffset + i * byteStride + 4 * k)));
+  };
+  const float = (at) => data.readFloatLE(at);
+  const minus = (a, b) => a.map((x, k) => x - b[k]);
+  let [flux, total] = [0, 0];
+  for (const { attributes, indices } of gltf.meshes.flatMap((mesh) => mesh.primitives)) {
+    const [positions, irradiance] = [read(attributes.POSITION, 3, float), read(attributes._IRRADIANCE, 3, float)];
+    const { bufferView, byteOffset = 0, count, componentType } = gltf.accessors[indices];
+    const start = (gltf.bufferViews[bufferView].byteOffset ?? 0) + byteOffset;
+    const corner = (i) => (componentType === 5125 ? data.readUInt32LE(start + 4 * i) : data.readUInt16LE(start + 2 * i));
+    const corners = Array.from({ length: count }, (_, i) => corner(i));
+    for (let k = 0; k < corners.length; k += 3) {
+      const [a, b, c] = corners.slice(k, k + 3);
+      const [u, v] = [minus(positions[b], positions[a]), minus(positions[c], positions[a])];
+      const area = Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+      const lux = [a, b, c].reduce((sum, i) => sum + irradiance[i][0] * 0.2126 + irradiance[i][1] * 0.7152 + irradiance[i][2] * 0.0722, 0) / 3;
+      [flux, total] = [flux + lux * area, total + area];
+    }
+  }
+  return flux / total;
+};
+
 test('layers add up, and models are saved', async () => {
   const page = await pages.open(program.url);
   await done(page);
@@ -687,6 +718,14 @@ test('layers add up, and models are saved', async () => {
     return [new TextDecoder().decode(bytes.slice(0, 4)), bytes.byteLength];
   }, name);
   for (const name of ['scene.glb', 'lit.glb']) assert.equal((await magic(name))[0], 'glTF', name);
+  // The lit model has the light that is shown.
+  await total('total');
+  const mean = await page.evaluate(() => {
+    const lux = window.radiosity.points(2000).map((point) => window.radiosity.lux(point) ?? 0);
+    return lux.reduce((sum, value) => sum + value, 0) / lux.length;
+  });
+  const written = meanLux(await page.evaluate(async () => [...new Uint8Array(await (await fetch('lit.glb')).arrayBuffer())]));
+  assert.ok(Math.abs(written - mean) < 0.02 * mean, `${written} lx in the file, ${mean} lx on the page`);
   for (const number of [1, 2]) {
     const saved = page.waitForEvent('download');
     await page.keyboard.press('x');

@@ -7,7 +7,7 @@ use super::solver::{Command, Export};
 use super::wire::{self, LONGEST, Refused, Request, Say};
 use axum::Router;
 use axum::body::{Body, Bytes};
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::extract::{Path, Request as HttpRequest, State};
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
@@ -264,7 +264,13 @@ async fn serve(place: Place, mut socket: WebSocket) {
                         return;
                     }
                 }
-                _ => return,
+                Some(Err(error)) => {
+                    // Says why, where the connection still stands: a message that was too long.
+                    let reason = format!("{error}").into();
+                    send(&mut socket, Message::Close(Some(CloseFrame { code: close_code::SIZE, reason }))).await;
+                    return;
+                }
+                None => return,
             },
             Some(text) = answers.recv() => {
                 if !send(&mut socket, Message::Text(text.into())).await {
