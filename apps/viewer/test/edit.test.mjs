@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, difference, done, folder, luxOf, NEAR, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
+import { compared, difference, done, folder, luxOf, NEAR, offline, online, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
 import { shown } from './display.mjs';
 import { studio } from './studio.mjs';
 
@@ -24,6 +24,23 @@ const handle = (page) => page.evaluate(() => {
   return [box.left + at.x, box.top + at.y];
 });
 
+/** Takes hold of that handle; where it is. However slow the page draws: until the handle knows of the pointer. */
+const grab = async (page) => {
+  const deadline = Date.now() + 20_000;
+  for (;;) {
+    const [x, y] = await handle(page);
+    await page.mouse.move(x + 1, y);
+    await page.mouse.move(x, y);
+    await page.waitForTimeout(100);
+    if (await page.evaluate(() => window.radiosity.app.gizmo.isOver)) {
+      await page.mouse.down();
+      if ((await state(page)).isDragging) return [x, y];
+      await page.mouse.up();
+    }
+    assert.ok(Date.now() < deadline, 'the handle cannot be taken hold of');
+  }
+};
+
 /** Uses a page on a program of its own that shows the studio. */
 const inStudio = (use) => folder(async (path) => {
   writeFileSync(join(path, 'studio.gltf'), studio());
@@ -41,13 +58,9 @@ test('a thing is dragged, and light follows while it is and as a batch solve has
   await done(page);
   const block = await named(page, 'short block');
   await page.evaluate((id) => window.radiosity.app.select(id), block.id);
-  await page.waitForTimeout(300);
-  const [x, y] = await handle(page);
   const before = await luxOf(page, 120);
   const { edits } = (await state(page)).status;
-  await page.mouse.move(x, y);
-  await page.waitForTimeout(100);
-  await page.mouse.down();
+  const [x, y] = await grab(page);
   for (let step = 1; step <= 10; step += 1) {
     await page.mouse.move(x - 6 * step, y);
     await page.waitForTimeout(30);
@@ -89,14 +102,10 @@ test('two pages drag a thing each at once, one loses its connection meanwhile, a
   const [one, two] = [await pages.open(program.url), await pages.open(program.url)];
   await Promise.all([done(one), done(two)]);
   const { edits } = (await state(one)).status;
-  const hands = await Promise.all([[one, 'short block', 5], [two, 'tall block', 1.5]].map(async ([page, name, pace]) => {
+  const hands = await Promise.all([[one, 'short block', 3], [two, 'tall block', 1]].map(async ([page, name, pace]) => {
     const { id } = await named(page, name);
     await page.evaluate((id) => window.radiosity.app.select(id), id);
-    await page.waitForTimeout(300);
-    const [x, y] = await handle(page);
-    await page.mouse.move(x, y);
-    await page.waitForTimeout(100);
-    await page.mouse.down();
+    const [x, y] = await grab(page);
     return { page, name, x, y, pace };
   }));
   const drag = async (steps) => {
@@ -111,18 +120,15 @@ test('two pages drag a thing each at once, one loses its connection meanwhile, a
   for (const page of [one, two]) {
     await page.waitForFunction(() => window.radiosity.state().objects.filter((object) => object.name.includes('block')).every((object) => Math.abs(object.matrix[12]) > 0.005));
   }
-  await two.context().setOffline(true);
-  await two.evaluate(() => window.radiosity.app.connection.drop());
-  await two.waitForFunction(() => !window.radiosity.state().isConnected);
+  await offline(two);
   await drag([6, 7, 8]);
-  await two.context().setOffline(false);
-  await caughtUp(two);
+  await online(two);
   await drag([9, 10]);
   for (const { page } of hands) await page.mouse.up();
   await Promise.all([done(one, edits + 2), done(two, edits + 2)]);
   const places = await matrices(one);
   assert.deepEqual(await matrices(two), places);
-  assert.ok(places.every((x) => Math.abs(x) > 0.02), `${places}`);
+  assert.ok(places.every((x) => Math.abs(x) > 0.01), `${places}`);
   const before = await luxOf(one, 80);
   assert.deepEqual(await luxOf(two, before.points), before);
   const off = await compared(one);
@@ -131,7 +137,7 @@ test('two pages drag a thing each at once, one loses its connection meanwhile, a
   // Of the page that stayed it is one change, however the other's lay between.
   await restored(one);
   assert.deepEqual(await matrices(two), [0, 0]);
-  assert.deepEqual([one.faults, two.faults.filter((fault) => !fault.includes('ERR_INTERNET_DISCONNECTED'))], [[], []]);
+  assert.deepEqual([one.faults, two.faults], [[], []]);
   await Promise.all([one.context().close(), two.context().close()]);
 });
 
@@ -425,7 +431,6 @@ test('lamps without area, sheets and colours at vertices', () => inStudio(async 
   const bulb = (await state(page)).lights.find(({ name }) => name === 'bulb');
   await page.evaluate((id) => window.radiosity.app.selectLight(id), bulb.id);
   await page.waitForTimeout(200);
-  const [x, y] = await handle(page);
   await page.evaluate((id) => {
     window.seen = [];
     const look = () => {
@@ -434,9 +439,7 @@ test('lamps without area, sheets and colours at vertices', () => inStudio(async 
     };
     look();
   }, bulb.id);
-  await page.mouse.move(x, y);
-  await page.waitForTimeout(100);
-  await page.mouse.down();
+  const [x, y] = await grab(page);
   for (let step = 1; step <= 25; step += 1) await page.mouse.move(x + 4 * step, y);
   await page.mouse.up();
   await page.waitForTimeout(500);

@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { curves, shown } from './display.mjs';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, picture, pixelsOf, restored, state, stuck, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, picture, pixelsOf, restored, state, stuck, view } from './program.mjs';
 import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
@@ -456,16 +456,13 @@ test('two pages see the same, and one that lost its connection catches up', asyn
   const light = (await state(one)).lights[0].id;
   const mode = (await state(two)).mode === 'walk' ? 'orbit' : 'walk';
   await two.evaluate((mode) => window.radiosity.app.walk(mode), mode);
-  await two.context().setOffline(true);
-  await two.evaluate(() => window.radiosity.app.connection.drop());
-  await two.waitForFunction(() => !window.radiosity.state().isConnected);
+  await offline(two);
   await one.evaluate((light) => {
     const { app } = window.radiosity;
     app.setLight(app.lights.get(light), { dimming: 0.25 });
   }, light);
   await done(one, edits + 1);
-  await two.context().setOffline(false);
-  await caughtUp(two);
+  await online(two);
   await done(two, edits + 1);
   const lux = (page) => page.evaluate(() => window.radiosity.points(80).map((point) => window.radiosity.lux(point)));
   assert.deepEqual(await lux(two), await lux(one));
@@ -491,6 +488,8 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   await reflectance.fill('150');
   await reflectance.press('Enter');
   await done(page, 1);
+  const has = await reflectance.elementHandle();
+  await page.waitForFunction(([field, before]) => field.value !== before && Number(field.value) < 99, [has, before]);
   const most = Number(await reflectance.inputValue());
   const painted = (await state(page)).objects.find(({ id }) => id === wall.id).reflectance;
   assert.ok(Math.abs(Math.max(...painted) - 0.99) < 1e-3 && most < 99, `${painted} ${most}`);
@@ -509,11 +508,7 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   });
   assert.ok(places.every((text) => text.length < 12 && Number.isFinite(Number(text))), `${places}`);
   await page.evaluate(() => window.radiosity.app.objectsAhead.takeBack());
-  await page.evaluate(() => {
-    window.WebSocket = class { close() {} };
-    window.radiosity.app.connection.drop();
-  });
-  await page.waitForFunction(() => !window.radiosity.state().isConnected);
+  await offline(page);
   assert.match(await page.locator('#doing').textContent(), /connection was lost/);
   assert.deepEqual(page.faults, []);
   await page.context().close();
@@ -643,9 +638,8 @@ test('malformed messages are refused and nothing is lost', async () => {
   }
   assert.ok((await state(page)).isConnected);
   // One that is too long ends the connection; the page comes back.
-  await page.evaluate(() => window.radiosity.app.connection.sendRaw('x'.repeat(1 << 20)));
-  await page.waitForFunction(() => !window.radiosity.state().isConnected);
-  await caughtUp(page);
+  await offline(page, () => page.evaluate(() => window.radiosity.app.connection.sendRaw('x'.repeat(1 << 20))));
+  await online(page);
   await done(page);
   assert.deepEqual(await lux(), before);
   assert.equal((await state(page)).status.edits, edits);

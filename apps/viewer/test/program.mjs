@@ -95,6 +95,26 @@ export async function caughtUp(page) {
   await page.waitForFunction(() => window.radiosity?.state().isCaughtUp, undefined, { timeout: 20_000 });
 }
 
+/** A page whose connection ends, by what is done, and which finds none until `online`. */
+export async function offline(page, end = () => page.evaluate(() => window.radiosity.app.connection.drop())) {
+  await page.evaluate(() => {
+    window.Line ??= window.WebSocket;
+    window.WebSocket = class {
+      static OPEN = 1;
+      constructor() { setTimeout(() => this.onclose(), 50); }
+      close() {}
+    };
+  });
+  await end();
+  await page.waitForFunction(() => !window.radiosity.state().isConnected);
+}
+
+/** It finds one again, and has what it missed. */
+export async function online(page) {
+  await page.evaluate(() => { window.WebSocket = window.Line; });
+  await caughtUp(page);
+}
+
 /** Waits until nothing is left to do, after at least so many edits, and all light has come. */
 export async function done(page, edits = 0) {
   await page.waitForFunction((edits) => {
