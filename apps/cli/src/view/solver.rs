@@ -1,13 +1,12 @@
 //! The thread that owns the session: takes what pages ask, works a little, and posts what has changed.
 
-use super::board::{Board, Notice, Subject};
+mod telling;
+
+use super::board::Board;
 use super::history::{self, Gesture, History, targets};
-use super::wire::{self, CameraPlace, PlaneAnswer, ProbeAnswer, Refused, Request, Say, Share};
-use radiosity::session::{
-    Edit, EditError, Layer, LightKind, Model, ModelLight, ModelObject, ObjectId, Plane, PlaneError, PlaneReading,
-    Probe, Reading, Session, SurfacePlace, Survey, Surveyed,
-};
-use radiosity::{Bands, Scene, luminance};
+use super::wire::{self, CameraPlace, Refused, Request, Say};
+use radiosity::session::{Edit, EditError, Layer, Model, ObjectId, Plane, Session, SurfacePlace, Survey};
+use radiosity::{Bands, Scene};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -28,13 +27,6 @@ const REST: u32 = 4;
 /// Cameras that are kept at most, and letters of their names.
 const MOST_CAMERAS: usize = 100;
 const LONGEST_NAME: usize = 80;
-
-/// Sources of light that are named at a place, and the least of their shares.
-const MOST_SOURCES: usize = 6;
-const LEAST_SHARE: f32 = 1e-3;
-
-/// A remainder below this is that of small sources.
-const LEAST_TOLD: f32 = 0.02;
 
 /// What pages ask of the solver.
 pub enum Command {
@@ -424,149 +416,6 @@ impl Solver {
         self.changed.clear();
     }
 
-    fn say(&self, subject: Subject, text: String) {
-        self.board.post(subject, Notice::Text(text));
-    }
-
-    fn post_scene(&mut self, placed: Option<CameraPlace>) {
-        let [low, high] = self.model.bounds;
-        let own = self.model.cameras.iter().filter_map(|camera| {
-            Some(CameraPlace { name: camera.name.clone(), matrix: camera.matrix, fov: camera.vertical_fov? })
-        });
-        let mut cameras: Vec<CameraPlace> = own.collect();
-        cameras.extend(placed);
-        let text = Say::Scene {
-            name: &self.model.name,
-            version: env!("CARGO_PKG_VERSION"),
-            up: self.model.up,
-            low,
-            high,
-            cameras,
-            sky: wire::sky(self.session.scene()),
-        }
-        .text();
-        self.say(Subject::Scene, text);
-        for object in &self.model.objects {
-            self.post_mesh(object);
-            self.post_object(object);
-            self.changed.insert(object.id);
-        }
-        self.model.lights.iter().for_each(|light| self.post_lamp(light));
-        self.post_cameras();
-        self.post_history();
-    }
-
-    /// What is new of objects and lights.
-    fn post_model(&mut self) {
-        let known = self.model.objects.len();
-        let (objects, lights) = self.session.update_model(&mut self.model);
-        let added = self.model.objects[known..].iter();
-        self.changed.extend(added.clone().map(|object| object.id));
-        added.for_each(|object| self.post_mesh(object));
-        objects.into_iter().for_each(|id| self.post_object(&self.model.objects[id.0 as usize]));
-        lights.into_iter().for_each(|id| self.post_lamp(&self.model.lights[id.0 as usize]));
-    }
-
-    fn post_mesh(&self, object: &ModelObject) {
-        let mesh = wire::mesh(object, self.session.scene());
-        self.board.post(Subject::Mesh(object.id.0), Notice::Binary(mesh));
-    }
-
-    fn post_object(&self, object: &ModelObject) {
-        self.say(Subject::Object(object.id.0), wire::object(object, self.session.scene()));
-    }
-
-    fn post_lamp(&self, light: &ModelLight) {
-        self.say(Subject::Light(light.id.0), wire::light(light));
-    }
-
-    fn post_cameras(&self) {
-        self.say(Subject::Bookmarks, Say::Bookmarks { cameras: &self.cameras }.text());
-    }
-
-    fn post_history(&self) {
-        let [undo, redo] = self.history.labels();
-        self.say(Subject::History, Say::History { undo, redo }.text());
-    }
-
-    fn post_status(&self) {
-        let status = self.session.status();
-        let (start, first) = self.since;
-        let traced = status.rays.saturating_sub(first);
-        let left = match traced {
-            0 => None,
-            _ => Some(start.elapsed().as_secs_f64() * f64::from(status.most_rays - status.rays) / f64::from(traced)),
-        };
-        // When all rays are there it takes about as long as the last time.
-        let left = match (self.settling, self.settled) {
-            (Some(since), Some(took)) => Some((took - since.elapsed().as_secs_f64()).max(0.0)),
-            (Some(_), None) => None,
-            _ => left,
-        };
-        let doing = match (self.is_done, self.edited.is_some()) {
-            (true, _) => match self.latency {
-                Some(latency) => format!("Up to date; the last change took {latency:.0} ms to be seen"),
-                None => "Up to date".to_owned(),
-            },
-            (false, true) => "Following the change".to_owned(),
-            (false, false) if status.rays == 0 => "First light".to_owned(),
-            (false, false) if status.rays == status.most_rays => "Telling lights apart".to_owned(),
-            (false, false) => format!("Tracing rays: {} of {} an element", status.rays, status.most_rays),
-        };
-        let status = wire::Status {
-            doing,
-            is_following: self.edited.is_some(),
-            rays: status.rays,
-            most_rays: status.most_rays,
-            error: Some(status.error).filter(|error| error.is_finite()),
-            seconds: status.seconds,
-            left: left.filter(|_| !self.is_done),
-            rays_traced: status.rays_traced,
-            elements: status.elements,
-            latency: self.latency,
-            is_done: self.is_done,
-            edits: self.edits,
-        };
-        self.say(Subject::Status, Say::Status(status).text());
-    }
-
-    /// A probe as people read it.
-    fn read(&self, probe: &Probe, here: Option<Reading>) -> ProbeAnswer {
-        let share = |bands: Bands| if probe.lux > 0.0 { luminance(bands) / probe.lux } else { 0.0 };
-        let light = |id: radiosity::session::LightId| {
-            let found = self.model.lights.iter().find(|light| light.id == id);
-            found.map_or_else(String::new, |light| match (light.name.as_str(), light.kind) {
-                (_, LightKind::Sky) => "Sky".to_owned(),
-                ("", _) => format!("light {}", id.0 + 1),
-                (name, _) => name.to_owned(),
-            })
-        };
-        let object = |id: ObjectId| {
-            let found = self.model.objects.iter().find(|object| object.id == id);
-            found.map_or_else(String::new, |object| object.name.clone())
-        };
-        let lights = probe.lights.iter().map(|(id, bands)| (light(*id), share(*bands)));
-        let straight = ("straight from lights".to_owned(), share(probe.direct));
-        let surfaces = probe.objects.iter().map(|(id, bands)| (object(*id), share(*bands)));
-        let mut lights = shares(lights);
-        // Reflections are sorted by light only when all else is done.
-        let rest = 1.0 - lights.iter().map(|known| known.share).sum::<f32>();
-        if !lights.is_empty() && rest > LEAST_TOLD {
-            lights.push(Share { name: "not told apart yet".to_owned(), share: rest });
-        }
-        // Shares are those of the element; how much it is, is measured at the place itself.
-        let irradiance = here.map_or(probe.irradiance, |here| here.irradiance);
-        let more = |band: usize| probe.reflectance[band] * (irradiance[band] - probe.irradiance[band]);
-        ProbeAnswer {
-            illuminance: luminance(irradiance),
-            irradiance,
-            reflectance: probe.reflectance,
-            radiosity: std::array::from_fn(|band| (probe.radiosity[band] + more(band)).max(0.0)),
-            lights,
-            surfaces: shares(std::iter::once(straight).chain(surfaces)),
-        }
-    }
-
     /// Works on what pages wait for until a time, at least on a few points.
     fn measure(&mut self, until: Instant) {
         self.measured.retain(|asked| !asked.answer.is_closed());
@@ -599,37 +448,6 @@ impl Solver {
         }
     }
 
-    fn tell_survey(&self, question: u64, surveyed: &Surveyed) -> String {
-        let there: Vec<&Reading> = surveyed.readings.iter().flatten().collect();
-        let mean = there.iter().map(|reading| f64::from(reading.lux)).sum::<f64>() / there.len().max(1) as f64;
-        let square = there.iter().map(|reading| f64::from(reading.error).powi(2)).sum::<f64>();
-        let error = (square / there.len().max(1) as f64).sqrt();
-        Say::Survey {
-            question,
-            lux: surveyed.readings.iter().map(|reading| reading.map(|reading| reading.lux)).collect(),
-            normal: there.first().map(|reading| reading.normal),
-            error: if mean > 0.0 { (error / mean) as f32 } else { 0.0 },
-            edits: self.edits,
-            is_done: self.is_done,
-        }
-        .text()
-    }
-
-    fn tell_plane(&self, question: u64, measured: Result<PlaneReading, PlaneError>) -> String {
-        let why = measured.as_ref().err().map(|error| format!("No working plane: {error}."));
-        let answer = measured.ok().map(|reading| PlaneAnswer {
-            points: reading
-                .points
-                .iter()
-                .map(|p| [p.position[0], p.position[1], p.position[2], p.lux.into()])
-                .collect(),
-            figures: reading.figures,
-            edits: self.edits,
-            is_done: self.is_done,
-        });
-        Say::Plane { question, answer, why }.text()
-    }
-
     fn export(&self) -> Export {
         let mut scene = self.session.edited_scene();
         for camera in &self.cameras {
@@ -643,21 +461,6 @@ impl Solver {
         let light = self.model.objects.iter().map(|object| self.session.light(object.id, Layer::Total)).collect();
         Export { scene, model: self.model.clone(), light }
     }
-}
-
-/// The largest shares; primitives of one name are one thing to people.
-fn shares(named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
-    let mut shares: Vec<Share> = Vec::new();
-    for (name, share) in named {
-        match shares.iter_mut().find(|known| known.name == name) {
-            Some(known) => known.share += share,
-            None => shares.push(Share { name, share }),
-        }
-    }
-    shares.retain(|known| known.share >= LEAST_SHARE);
-    shares.sort_by(|a, b| b.share.total_cmp(&a.share));
-    shares.truncate(MOST_SOURCES);
-    shares
 }
 
 /// An edit that was refused.

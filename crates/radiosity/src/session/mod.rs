@@ -33,9 +33,10 @@
 //! smooth within an object and may jump between two that touch.
 
 mod added;
+mod carry;
+mod check;
 mod display;
 mod edit;
-mod edited;
 mod light;
 mod model;
 mod movable;
@@ -55,8 +56,8 @@ pub use plane::{Plane, PlaneError, PlaneFigures, PlanePoint, PlaneQuestion, Plan
 pub use survey::{Reading, SurfacePlace, Survey, Surveyed};
 
 use crate::Error;
+use carry::Done;
 use display::{Display, Weights};
-use edited::Done;
 use light::{Light, MOST_COLUMNS, Strand};
 use paint::Paint;
 use radiosity_scene::{Bands, Scene};

@@ -6,7 +6,12 @@
 //! edit costs a few rays per element and not all. Shadow rays likewise: stopped ones that pass through the box where the object
 //! was may have come free, free ones that pass through the box where it is may be stopped.
 
-use super::body::{Body, Bounds, Site};
+mod dirt;
+mod shadows;
+
+pub use dirt::{Change, Dirt};
+
+use super::body::Site;
 use super::column::Column;
 use super::strata::{Cells, Strata};
 use super::world::{Met, World};
@@ -15,6 +20,7 @@ use radiosity_scene::Bands;
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_trace::Ray;
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
+use shadows::Shadows;
 use smallvec::SmallVec;
 
 /// Elements of a chunk: a millisecond of work for a few rays each.
@@ -34,20 +40,8 @@ pub const ROWS: u32 = 0x0100;
 /// chance for it.
 const NEIGHBOURS: usize = 4;
 
-/// Slack for cosines of angles: that of ray directions in single precision.
-const ROUNDING: f64 = 1e-6;
-
 /// Elements of which less than this part is exposed get no light.
 const LEAST_OPEN: f32 = 1.0 / 16.0;
-
-/// A change of an object or of columns.
-#[derive(Clone, Debug)]
-pub struct Change {
-    /// The object.
-    pub body: usize,
-    /// Where it was, if it was there.
-    pub before: Option<Bounds>,
-}
 
 /// Which of the rays are worked on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,19 +70,6 @@ impl Target {
     fn of(self, part: Part) -> Target {
         if part == Part::Near { self.near() } else { self }
     }
-}
-
-/// Light of one column.
-#[derive(Clone, Debug, Default)]
-struct Shadows {
-    /// Shadow rays so far.
-    rays: u32,
-    /// Which of them came through, by element.
-    clear: Vec<u64>,
-    /// What they bring, lux per band, by element.
-    light: Vec<Bands>,
-    /// Whether only the first of them are in that.
-    is_rough: Vec<bool>,
 }
 
 /// Some elements of one object.
@@ -140,87 +121,6 @@ pub struct Work<'a> {
     pub target: Target,
     /// Whether black backs have an id.
     pub is_dark: &'a [bool],
-}
-
-/// An object that has changed: ids, whether it is there, and the balls and boxes where it was and is.
-struct Dirty<'a> {
-    body: usize,
-    own: &'a Body,
-    now: Option<Bounds>,
-}
-
-/// What chunks that have seen as many changes have to look at.
-pub struct Dirt<'a> {
-    bodies: Vec<Dirty<'a>>,
-    /// Where they were and are: a box, and the ball around it.
-    before: Vec<(Bounds, (DVec3, f64))>,
-    now: Vec<(Bounds, (DVec3, f64))>,
-    /// Lowest of their ids, and how much higher the highest is.
-    ids: (u32, u32),
-}
-
-impl<'a> Dirt<'a> {
-    /// Of some changes. Only the first of each object counts: rays that have not seen it are of the world before it, and
-    /// where the object is now it tells itself.
-    pub fn new(world: &'a World, changes: &[Change]) -> Dirt<'a> {
-        let mut dirt = Dirt { bodies: Vec::new(), before: Vec::new(), now: Vec::new(), ids: (0, 0) };
-        let margin = 4.0 * world.offset;
-        let around = |bounds: Bounds| {
-            let (centre, radius) = bounds.ball();
-            (bounds, (centre, radius + margin))
-        };
-        for change in changes {
-            if dirt.bodies.iter().all(|other| other.body != change.body) {
-                let own = &world.bodies[change.body];
-                let now = own.is_present.then_some(own.bounds);
-                dirt.before.extend(change.before.map(around));
-                dirt.now.extend(now.map(around));
-                dirt.bodies.push(Dirty { body: change.body, own, now });
-            }
-        }
-        let low = dirt.bodies.iter().map(|dirty| dirty.own.first).min().unwrap_or(0);
-        let high = dirt.bodies.iter().map(|dirty| dirty.own.dark()).max().unwrap_or(0);
-        dirt.ids = (low, high - low);
-        dirt
-    }
-
-    /// The directions from a place in which what has changed may be now.
-    fn cones(&self, site: &Site) -> SmallVec<[Cone; 4]> {
-        let mut cones = SmallVec::new();
-        for (_, (centre, radius)) in &self.now {
-            let along = *centre - site.centre;
-            let reach = radius + site.radius;
-            if along.dot(site.normal) <= -reach {
-                continue;
-            }
-            let distance = along.length();
-            if distance <= 1.001 * reach {
-                cones.clear();
-                cones.push(Cone { axis: site.normal, angle: None, nearest: 0.0 });
-                break;
-            }
-            let sine = reach / distance;
-            let angle = Some(((1.0 - sine * sine).sqrt(), sine));
-            cones.push(Cone { axis: along / distance, angle, nearest: distance - reach });
-        }
-        cones
-    }
-}
-
-/// Directions to a ball.
-struct Cone {
-    axis: DVec3,
-    /// Cosine and sine of half its angle; none for all directions.
-    angle: Option<(f64, f64)>,
-    /// Nearer than this nothing of the ball is met.
-    nearest: f64,
-}
-
-impl Cone {
-    #[inline]
-    fn has(&self, direction: DVec3) -> bool {
-        self.angle.is_none_or(|(cosine, _)| self.axis.dot(direction) >= cosine - ROUNDING)
-    }
 }
 
 /// Words of a bit for each ray of a row, at most.
@@ -315,21 +215,6 @@ impl Chunk {
         shadows.clear.fill(0);
         shadows.light.fill([0.0; 3]);
         shadows.is_rough.fill(false);
-    }
-
-    /// Adds up the light of a column anew, whose strengths have changed.
-    pub fn add_up(&mut self, work: &Work, column: usize) {
-        let body = &work.world.bodies[self.body];
-        if !body.is_present {
-            return;
-        }
-        for e in 0..self.len {
-            let (site, seed) = self.site(work.world, e);
-            let shadows = &self.shadows[column];
-            let (n, clear) = (shadows.rays, shadows.clear[e]);
-            self.shadows[column].light[e] = bring(work, column, (&site, seed), n, clear);
-            self.shadows[column].is_rough[e] = false;
-        }
     }
 
     /// How many changes have been looked at, for the first part and the rest.
@@ -559,102 +444,6 @@ impl Chunk {
         lost
     }
 
-    /// Traces the shadow rays to a column that changes have dirtied.
-    fn mend_shadows(&mut self, work: &Work, part: Part, dirt: &Dirt, column: usize) -> u64 {
-        let known = self.shadows[column].rays;
-        let light = &work.columns[column];
-        if known == 0 || light.is_empty() {
-            return 0;
-        }
-        let range = match part {
-            Part::Near => 0..known.min(NEAR_SHADOWS),
-            Part::Far => NEAR_SHADOWS.min(known)..known,
-        };
-        let (world, margin) = (work.world, 4.0 * work.world.offset);
-        // What the first part has made rough the rest makes whole, though nothing of its own is dirty: an object that went away and
-        // came back was elsewhere meanwhile, for the first part only.
-        let is_rough = |e: usize| part == Part::Far && self.shadows[column].is_rough[e];
-        let is_near = |region: &(Bounds, (DVec3, f64))| light.may_meet(self.ball, region);
-        if !dirt.before.iter().chain(&dirt.now).any(is_near) && !(0..self.len).any(is_rough) {
-            return 0;
-        }
-        let all = ((1u128 << range.end) - (1u128 << range.start)) as u64;
-        let mut rays = 0;
-        for e in 0..self.len {
-            let (site, seed) = self.site(world, e);
-            let is_rough = part == Part::Far && self.shadows[column].is_rough[e];
-            let mut clear = self.shadows[column].clear[e];
-            let is_near = |region: &(Bounds, (DVec3, f64))| light.may_meet((site.centre, site.radius), region);
-            let may_change = light.may_reach(&site)
-                && (clear & all != all && dirt.before.iter().any(is_near)
-                    || clear & all != 0 && dirt.now.iter().any(is_near));
-            if !may_change && !is_rough {
-                continue;
-            }
-            let sequence = light.sequence(seed);
-            for index in range.clone().filter(|_| may_change) {
-                let Some(sample) = light.sample(world, &site, (seed, &sequence), index) else { continue };
-                let bit = 1u64 << index;
-                let (origin, direction) = (sample.ray.origin.as_dvec3(), sample.ray.direction.as_dvec3());
-                let meets = |(bounds, _): &(Bounds, (DVec3, f64))| {
-                    bounds.may_meet(origin, direction, f64::from(sample.ray.t_max), margin)
-                };
-                if clear & bit == 0 {
-                    if dirt.before.iter().any(meets) {
-                        rays += 1;
-                        if !world.blocked(&sample.ray, sample.salt) {
-                            clear |= bit;
-                        }
-                    }
-                } else if dirt.now.iter().any(meets) {
-                    rays += 1;
-                    if dirt.bodies.iter().any(|dirty| world.blocked_by(dirty.body, &sample.ray, sample.salt)) {
-                        clear &= !bit;
-                    }
-                }
-            }
-            let own = &mut self.shadows[column];
-            if std::mem::replace(&mut own.clear[e], clear) == clear && !is_rough {
-                continue;
-            }
-            own.is_rough[e] = part == Part::Near && known > NEAR_SHADOWS;
-            let n = if own.is_rough[e] { NEAR_SHADOWS } else { known };
-            own.light[e] = bring(work, column, (&site, seed), n, clear);
-        }
-        rays
-    }
-
-    fn trace_shadows(&mut self, work: &Work, column: usize, target: u32) -> u64 {
-        let (world, light) = (work.world, &work.columns[column]);
-        let from = std::mem::replace(&mut self.shadows[column].rays, target);
-        if light.is_empty() {
-            return 0;
-        }
-        let mut rays = 0;
-        for e in 0..self.len {
-            let (site, seed) = self.site(world, e);
-            let sequence = light.sequence(seed);
-            let mut clear = self.shadows[column].clear[e];
-            let mut sum = [0f64; 3];
-            for index in from..target {
-                if let Some(sample) = light.sample(world, &site, (seed, &sequence), index) {
-                    rays += 1;
-                    if !world.blocked(&sample.ray, sample.salt) {
-                        clear |= 1 << index;
-                        (0..3).for_each(|band| sum[band] += sample.light[band]);
-                    }
-                }
-            }
-            self.shadows[column].clear[e] = clear;
-            // The same sum by `bring` would draw all samples once more.
-            let is_first = from == 0;
-            self.shadows[column].light[e] =
-                if is_first { mean(sum, target) } else { bring(work, column, (&site, seed), target, clear) };
-            self.shadows[column].is_rough[e] = false;
-        }
-        rays
-    }
-
     /// Whether next to nothing of an element is exposed, so that it gets no light.
     pub fn is_buried(&self, e: usize) -> bool {
         self.open[e] == 0.0
@@ -739,23 +528,6 @@ fn shoot_to(world: &World, site: &Site, (sequence, seed): (&Sequence, u32), dire
 #[inline]
 fn salt_of(seed: u32, m: u32) -> u32 {
     hash(hash(seed) ^ m)
-}
-
-/// What the first `n` shadow rays bring, given which are clear.
-fn bring(work: &Work, column: usize, (site, seed): (&Site, u32), n: u32, clear: u64) -> Bands {
-    let light = &work.columns[column];
-    let sequence = light.sequence(seed);
-    let mut sum = [0f64; 3];
-    for index in (0..n).filter(|index| clear >> index & 1 == 1) {
-        if let Some(sample) = light.sample(work.world, site, (seed, &sequence), index) {
-            (0..3).for_each(|band| sum[band] += sample.light[band]);
-        }
-    }
-    mean(sum, n)
-}
-
-fn mean(sum: [f64; 3], n: u32) -> Bands {
-    sum.map(|s| (s / f64::from(n.max(1))) as f32)
 }
 
 /// How many rays of a row start from the exposed part of the element, and how large that part is. A ray that meets a black

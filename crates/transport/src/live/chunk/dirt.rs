@@ -1,0 +1,99 @@
+//! What an edit has dirtied, as chunks look for it.
+
+use super::super::body::{Body, Bounds, Site};
+use super::super::world::World;
+use glam::DVec3;
+use smallvec::SmallVec;
+
+/// Slack for cosines of angles: that of ray directions in single precision.
+const ROUNDING: f64 = 1e-6;
+
+/// A change of an object or of columns.
+#[derive(Clone, Debug)]
+pub struct Change {
+    /// The object.
+    pub body: usize,
+    /// Where it was, if it was there.
+    pub before: Option<Bounds>,
+}
+
+/// An object that has changed: ids, whether it is there, and the balls and boxes where it was and is.
+pub struct Dirty<'a> {
+    pub body: usize,
+    pub own: &'a Body,
+    pub now: Option<Bounds>,
+}
+
+/// What chunks that have seen as many changes have to look at.
+pub struct Dirt<'a> {
+    pub bodies: Vec<Dirty<'a>>,
+    /// Where they were and are: a box, and the ball around it.
+    pub before: Vec<(Bounds, (DVec3, f64))>,
+    pub now: Vec<(Bounds, (DVec3, f64))>,
+    /// Lowest of their ids, and how much higher the highest is.
+    pub ids: (u32, u32),
+}
+
+impl<'a> Dirt<'a> {
+    /// Of some changes. Only the first of each object counts: rays that have not seen it are of the world before it, and
+    /// where the object is now it tells itself.
+    pub fn new(world: &'a World, changes: &[Change]) -> Dirt<'a> {
+        let mut dirt = Dirt { bodies: Vec::new(), before: Vec::new(), now: Vec::new(), ids: (0, 0) };
+        let margin = 4.0 * world.offset;
+        let around = |bounds: Bounds| {
+            let (centre, radius) = bounds.ball();
+            (bounds, (centre, radius + margin))
+        };
+        for change in changes {
+            if dirt.bodies.iter().all(|other| other.body != change.body) {
+                let own = &world.bodies[change.body];
+                let now = own.is_present.then_some(own.bounds);
+                dirt.before.extend(change.before.map(around));
+                dirt.now.extend(now.map(around));
+                dirt.bodies.push(Dirty { body: change.body, own, now });
+            }
+        }
+        let low = dirt.bodies.iter().map(|dirty| dirty.own.first).min().unwrap_or(0);
+        let high = dirt.bodies.iter().map(|dirty| dirty.own.dark()).max().unwrap_or(0);
+        dirt.ids = (low, high - low);
+        dirt
+    }
+
+    /// The directions from a place in which what has changed may be now.
+    pub fn cones(&self, site: &Site) -> SmallVec<[Cone; 4]> {
+        let mut cones = SmallVec::new();
+        for (_, (centre, radius)) in &self.now {
+            let along = *centre - site.centre;
+            let reach = radius + site.radius;
+            if along.dot(site.normal) <= -reach {
+                continue;
+            }
+            let distance = along.length();
+            if distance <= 1.001 * reach {
+                cones.clear();
+                cones.push(Cone { axis: site.normal, angle: None, nearest: 0.0 });
+                break;
+            }
+            let sine = reach / distance;
+            let angle = Some(((1.0 - sine * sine).sqrt(), sine));
+            cones.push(Cone { axis: along / distance, angle, nearest: distance - reach });
+        }
+        cones
+    }
+}
+
+/// Directions to a ball.
+pub struct Cone {
+    pub axis: DVec3,
+    /// Cosine and sine of half its angle; none for all directions.
+    pub angle: Option<(f64, f64)>,
+    /// Nearer than this nothing of the ball is met.
+    pub nearest: f64,
+}
+
+impl Cone {
+    #[inline]
+    pub fn has(&self, direction: DVec3) -> bool {
+        self.angle.is_none_or(|(cosine, _)| self.axis.dot(direction) >= cosine - ROUNDING)
+    }
+}
