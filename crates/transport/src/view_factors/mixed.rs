@@ -32,8 +32,8 @@ const STEEP: f64 = 1e-3;
 const OF_WHOLE: f64 = 0.01;
 
 /// Error of a facet that is not cut along kinks, relative to the tolerance. With 0 all are cut, and rows of a room of 3,200 patches,
-/// asked for 1e-4, are off by 4.4e-5 (RMS) instead of 6.1e-5; with 1 by 9.7e-5.
-const UNCUT: f64 = 0.4;
+/// asked for 1e-4, are off by 4.4e-5 (RMS) instead of 7.0e-5; with 1 by 9.7e-5.
+const UNCUT: f64 = 0.6;
 
 /// What all parts of a leaf share that look at one target past the same panels. They lie in one plane, and from there
 /// bodies look alike, as do the lines where what is seen has kinks, and the corners where parts meet.

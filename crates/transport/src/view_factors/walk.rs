@@ -231,9 +231,6 @@ impl<'a> Walk<'a> {
         if !target.panels.is_empty() {
             let mut shaft = Shaft::new(ends.map(|end| end.corners), [a, b].map(|part| part.shape.normal()), self.touch);
             for (k, panel) in target.panels.iter().enumerate() {
-                if ends.iter().any(|end| end.heights(&panel.corners)[1] <= self.touch) {
-                    continue;
-                }
                 match shaft.stands(panel, Look::Close) {
                     Stands::Aside => {}
                     Stands::Between => list.push(k as u16),
