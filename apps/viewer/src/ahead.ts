@@ -11,6 +11,8 @@ export class Ahead<T extends { id: number }> {
   /** As the server said last. */
   private said = new Map<number, T>();
   private own = new Map<number, { change: Partial<T>; since: number }>();
+  /** Shown as this page had changed them, until the server says how they are. */
+  private loose = new Set<number>();
   /** The largest number shown. */
   private last = -1;
 
@@ -20,6 +22,7 @@ export class Ahead<T extends { id: number }> {
   /** The server says how a thing is. */
   hear(thing: T): void {
     this.said.set(thing.id, thing);
+    this.loose.delete(thing.id);
     const own = this.own.get(thing.id);
     if (own && agrees(thing, own.change)) this.own.delete(thing.id);
     this.put(thing.id);
@@ -33,13 +36,15 @@ export class Ahead<T extends { id: number }> {
 
   /** From now on things are as the server says. */
   forget(): void {
+    for (const id of this.own.keys()) this.loose.add(id);
     this.own.clear();
   }
 
   /** What was changed here and not confirmed is as before. */
   takeBack(): void {
-    const ids = [...this.own.keys()];
+    const ids = new Set([...this.own.keys(), ...this.loose]);
     this.own.clear();
+    this.loose.clear();
     for (const id of ids) this.put(id);
   }
 

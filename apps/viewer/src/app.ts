@@ -24,6 +24,9 @@ export type Topic =
 /** Milliseconds between edits of one gesture: more often than light can follow is of no use. */
 const GESTURE = 40;
 
+/** Milliseconds within which steps of one field belong together. */
+const STEPS = 600;
+
 /** Milliseconds that a message is told. */
 const READ = 10_000;
 
@@ -69,6 +72,8 @@ export class App {
   private loosened = new Set<number>();
   private textures = new Map<string, Texture>();
   private gesture = 0;
+  /** The field whose number was stepped last, of what, and when. */
+  private step: { field: Element | null; of: string; since: number } = { field: null, of: '', since: 0 };
   private pending: { gesture?: number; send: () => void; timer: number } | null = null;
   private lastSent = 0;
   /** The gesture of the last edit, and what was refused since it began. */
@@ -223,6 +228,7 @@ export class App {
     if (this.opened === null) this.navigator.choose();
     this.opened ??= performance.now();
     this.measuring.begin();
+    this.sight.begin();
     this.tell('view');
     this.tell('connection');
   }
@@ -387,6 +393,16 @@ export class App {
     return this.gesture;
   }
 
+  /** The gesture of the field that is written in: steps of its number that follow each other at once are one. */
+  stepped(): number {
+    const { activeElement } = document;
+    const step = { field: activeElement, of: `${this.selected} ${this.selectedLight}`, since: performance.now() };
+    const { field, of, since } = this.step;
+    if (field !== step.field || of !== step.of || step.since - since > STEPS) this.nextGesture();
+    this.step = step;
+    return this.gesture;
+  }
+
   undo(): void {
     this.goBack('undo');
   }
@@ -434,7 +450,7 @@ export class App {
     this.lightsAhead.change(id, change);
     const { type, cone, intensity } = this.lights.get(id)!;
     const kind = cone ? { spot: { inner: cone[0], outer: cone[1] } } : (type as 'point' | 'directional');
-    this.edit({ change_light: { light: id, kind, intensity: intensity! } });
+    this.edit({ change_light: { light: id, kind, intensity: intensity! } }, this.stepped());
   }
 
   paint(object: number, reflectance: number[], gesture?: number): void {
@@ -490,7 +506,7 @@ export class App {
 
   /** Moves by a way and turns: by an angle about the zenith, and lamps about the right of who looks, what was added about its own
    *  x axis. */
-  nudge(way: Vector3, angle: number, tilt = 0): void {
+  nudge(way: Vector3, angle: number, tilt: number, gesture: number): void {
     const spot = this.spot();
     if (!spot) {
       if (this.selected !== null) this.say('It is part of the building and stays put, unless “Let it move” is pressed in the panel.');
@@ -501,9 +517,9 @@ export class App {
       .multiply(new Matrix4().makeRotationY(angle))
       .multiply(new Matrix4().makeTranslation(spot.clone().negate()));
     const [part] = this.adding.parts();
-    if (this.selectedLight !== null) this.moveLight(this.selectedLight, motion.multiply(about(spot, right, tilt)));
-    else if (!part) this.move(motion);
-    else this.move(motion.multiply(about(this.stage.toWorld(part.matrix.slice(12, 15)), this.adding.axes(part)[0], tilt)));
+    if (this.selectedLight !== null) this.moveLight(this.selectedLight, motion.multiply(about(spot, right, tilt)), gesture);
+    else if (!part) this.move(motion, gesture);
+    else this.move(motion.multiply(about(this.stage.toWorld(part.matrix.slice(12, 15)), this.adding.axes(part)[0], tilt)), gesture);
   }
 
   /** About what the selected thing or lamp turns, in the world; none if it cannot be moved. */

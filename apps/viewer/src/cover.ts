@@ -15,6 +15,7 @@ const CLEAR = 1e-3;
 interface Thing {
   surfaces: Surface[];
   box: Box3;
+  isMovable: boolean;
 }
 
 /** Marks the points that are covered now. */
@@ -23,12 +24,15 @@ export function cover(app: App, grid: Grid, picked: Vector3): void {
   const { normal } = grid;
   const along = new Vector3(normal.y, normal.z, normal.x).cross(normal).normalize();
   const things = new Map<number, Thing>();
+  const around = new Box3().setFromPoints(grid.points.map(({ point }) => point)).expandByScalar(2 * LYING * scale);
+  const near: Surface[] = [];
   for (const surface of stage.surfaces.values()) {
     if (!surface.visible) continue;
+    if (stage.box(surface).intersectsBox(around)) near.push(surface);
     // What has just been added is there before its name is.
     const group = app.objects.get(surface.object)?.group;
     if (group === undefined) continue;
-    const thing = things.get(group) ?? { surfaces: [], box: new Box3() };
+    const thing = things.get(group) ?? { surfaces: [], box: new Box3(), isMovable: app.objects.get(surface.object)!.movable };
     thing.surfaces.push(surface);
     thing.box.union(stage.box(surface));
     things.set(group, thing);
@@ -37,12 +41,12 @@ export function cover(app: App, grid: Grid, picked: Vector3): void {
   // Of what is closed a ray leaves once more than it enters, to every side. One side alone would take a storey above for a cover.
   const isWithin = ({ surfaces, box }: Thing, from: Vector3) =>
     box.containsPoint(from) && [normal, along].every((way) => leaves(surfaces, from, way) > 0);
-  // What is around the picked place is the room, or the house that it is in.
+  // What is around the picked place is the room, or the house that it is in, unless it is furniture that came to stand there.
   const start = above(picked);
-  const covers = [...things.values()].filter((thing) => !isWithin(thing, start));
+  const covers = [...things.values()].filter((thing) => thing.box.intersectsBox(around) && (thing.isMovable || !isWithin(thing, start)));
   for (const point of grid.points) {
     const from = above(point.point);
-    const lying = stage.cast(from, normal, LYING * scale, DoubleSide);
+    const lying = stage.cast(from, normal, LYING * scale, DoubleSide, near);
     point.isCovered = lying !== null || covers.some((thing) => isWithin(thing, from));
   }
 }

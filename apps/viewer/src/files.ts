@@ -11,7 +11,7 @@ export function savePoints(app: App): void {
   const row = ({ point, lux }: ReturnType<typeof measured>[number]) =>
     [...stage.toScene(point).toArray().map((x) => Number(x.toPrecision(9))), ...up.map((x) => x.toFixed(6)), lux.toPrecision(6)].join(',');
   const read = grid && app.layer;
-  const column = read === 'relative_error' ? 'noise_percent' : read === 'error' ? 'noise_lux' : 'illuminance_lux';
+  const column = read === 'relative_error' ? 'noise_percent' : read === 'error' ? 'noise_lux' : 'page_lux';
   const rows = [`x,y,z,nx,ny,nz,${column}`, ...measured(app).map(row), ''];
   save(app, new Blob([rows.join('\n')], { type: 'text/csv' }), plane ? 'plane.csv' : 'grid.csv');
   app.say('Points saved, each with its place and normal.');

@@ -6,6 +6,9 @@ import { nextName } from './panels/cameras';
 import { el, toggle } from './panels/parts';
 import { shared } from './surface';
 
+/** Keys that act on while they are held. */
+const STEADY = ['j', 'k', 'u', 'o', ',', '.', 'home', 'end', 'pageup', 'pagedown', '+', '=', '-', 'c', 'l', 'p'];
+
 /** What each key is for, as it is shown. */
 const LIST: [string, [string, string][]][] = [
   ['Move', [
@@ -136,21 +139,27 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     h: () => help.showModal(),
     '?': () => help.showModal(),
     escape: () => app.select(null),
-    j: (event) => app.nudge(right().multiplyScalar(-size(event)), 0),
-    k: (event) => app.nudge(right().multiplyScalar(size(event)), 0),
-    u: (event) => app.nudge(away().multiplyScalar(size(event)), 0),
-    o: (event) => app.nudge(away().multiplyScalar(-size(event)), 0),
-    pageup: (event) => app.nudge(new Vector3(0, size(event), 0), 0),
-    pagedown: (event) => app.nudge(new Vector3(0, -size(event), 0), 0),
-    ',': (event) => app.nudge(new Vector3(), angle(event)),
-    '.': (event) => app.nudge(new Vector3(), -angle(event)),
-    home: (event) => tilt(angle(event)),
-    end: (event) => tilt(-angle(event)),
+    j: (event) => nudge(event, right().multiplyScalar(-size(event))),
+    k: (event) => nudge(event, right().multiplyScalar(size(event))),
+    u: (event) => nudge(event, away().multiplyScalar(size(event))),
+    o: (event) => nudge(event, away().multiplyScalar(-size(event))),
+    pageup: (event) => nudge(event, new Vector3(0, size(event), 0)),
+    pagedown: (event) => nudge(event, new Vector3(0, -size(event), 0)),
+    ',': (event) => nudge(event, new Vector3(), angle(event)),
+    '.': (event) => nudge(event, new Vector3(), -angle(event)),
+    home: (event) => tilt(event, angle(event)),
+    end: (event) => tilt(event, -angle(event)),
   };
   const size = (event: KeyboardEvent) => (event.shiftKey ? 0.1 : 1) * NUDGE * Math.min(1, app.stage.bounds.getSize(new Vector3()).length() / 5);
-  const tilt = (by: number) => {
+  // A key that is held is one gesture.
+  let gesture = 0;
+  const nudge = (event: KeyboardEvent, way: Vector3, turn = 0, tilt = 0) => {
+    if (!event.repeat) gesture = app.nextGesture();
+    app.nudge(way, turn, tilt, gesture);
+  };
+  const tilt = (event: KeyboardEvent, by: number) => {
     if (app.selectedLight === null && app.adding.parts().length === 0) app.say('Lamps without area can be tilted, and what was added: select one first.');
-    else app.nudge(new Vector3(), 0, by);
+    else nudge(event, new Vector3(), 0, by);
   };
   const angle = (event: KeyboardEvent) => ((event.shiftKey ? 0.2 : 1) * TURN * Math.PI) / 180;
 
@@ -161,6 +170,12 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     const isField = target.matches('input:not([type=checkbox]), select, textarea');
     if (key === 'escape' && target !== app.stage.canvas) {
       app.stage.canvas.focus();
+      return;
+    }
+    // What is held adds, copies and saves once; it moves, tunes and undoes on.
+    const goesOn = (event.ctrlKey || event.metaKey ? ['z', 'y'] : STEADY).includes(key) || held.has(key);
+    if (event.repeat && !goesOn && !isField) {
+      if (acts[key]) event.preventDefault();
       return;
     }
     if (event.ctrlKey || event.metaKey) {

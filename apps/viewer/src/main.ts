@@ -50,7 +50,7 @@ function start(): void {
     const { status } = app;
     if (!status) return;
     if (!app.isConnected) {
-      doing.textContent = told.textContent = 'The connection was lost; what is seen is from before. Trying again …';
+      doing.textContent = told.textContent = 'The connection was lost; what is seen is from before. Trying again … If the program has ended, start it again and open the address that it prints.';
       return;
     }
     const left = status.is_done || status.left === null ? '' : ` · about ${duration(status.left)} left`;

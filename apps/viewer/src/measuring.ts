@@ -45,14 +45,16 @@ export class Measuring {
   }
 
   hearPlane(question: number, answer: PlaneAnswer | null, why: string | null): void {
-    if (this.asker.hear(question)) this.tellPlane(answer, why);
+    this.asker.hear(question, () => this.tellPlane(answer, why));
   }
 
   hearSurvey(question: number, answer: SurveyAnswer): void {
-    if (!this.asker.hear(question) || !this.grid) return;
-    this.grid.asked.forEach((point, i) => { point.measured = answer.lux[i]; });
-    this.grid.answer = answer;
-    this.readGrid();
+    this.asker.hear(question, () => {
+      if (!this.grid) return;
+      this.grid.asked.forEach((point, i) => { point.measured = answer.lux[i]; });
+      this.grid.answer = answer;
+      this.readGrid();
+    });
   }
 
   /** All is there again after the connection was lost. */
@@ -68,6 +70,7 @@ export class Measuring {
   /** A surface is gone, and what was laid on it. */
   lose(surface: Surface): void {
     if ((this.grid ?? this.plane)?.surface === surface) this.clearGrid();
+    if (this.probed?.hit.surface === surface) this.clearProbe();
   }
 
   /** Light has come: what was read before is read again. */
@@ -90,16 +93,21 @@ export class Measuring {
   pick(x: number, y: number): void {
     const hit = this.app.stage.pick(x, y);
     if (!hit) {
-      this.probed = null;
-      this.app.marks.point(null);
+      this.clearProbe();
       this.app.select(null);
-      this.app.tell('probe');
       return;
     }
     this.probed = { hit, answer: null };
     this.app.marks.point(hit);
     this.app.select(hit.surface.object);
     this.askProbe();
+    this.app.tell('probe');
+  }
+
+  private clearProbe(): void {
+    this.probed = null;
+    this.app.marks.point(null);
+    this.app.marks.rays([]);
     this.app.tell('probe');
   }
 

@@ -55,12 +55,12 @@ export class Asker {
     }
   }
 
-  /** Whether an answer is that to the last question. */
-  hear(question: number): boolean {
-    if (question !== this.question || !this.isWaiting) return false;
+  /** Takes an answer, if it is that to the last question, and asks the next one then: it may be about other points. */
+  hear(question: number, take: () => void): void {
+    if (question !== this.question || !this.isWaiting) return;
     this.isWaiting = false;
+    take();
     if (this.isDue) this.ask();
-    return true;
   }
 }
 

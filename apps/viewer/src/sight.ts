@@ -17,6 +17,11 @@ export class Sight {
     setInterval(() => this.look(), EVERY);
   }
 
+  /** All is there, and nothing is asked yet: what was asked on a connection that is lost has no answer. */
+  begin(): void {
+    this.asked = '';
+  }
+
   /** The server says how far it is. */
   hear(question: number, error: number | null): void {
     if (question === this.question) this.put(error);

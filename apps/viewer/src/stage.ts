@@ -274,13 +274,13 @@ export class Stage {
   }
 
   /** The first surface along a ray. `side` says which faces count. */
-  cast(origin: Vector3, direction: Vector3, far = Infinity, side: Side | null = null): Hit | null {
+  cast(origin: Vector3, direction: Vector3, far = Infinity, side: Side | null = null, among: Iterable<Surface> = this.surfaces.values()): Hit | null {
     const ray = new Ray(origin, direction);
     const local = new Ray();
     const inverse = new Matrix4();
     const entry = new Vector3();
     let best: Hit | null = null;
-    for (const surface of this.surfaces.values()) {
+    for (const surface of among) {
       if (!surface.visible) continue;
       const box = this.boxes.get(surface.object)!;
       const reach = best ? best.distance : far;

@@ -80,6 +80,8 @@ export interface LightNotice {
   direction: number[] | null;
   object: number | null;
   deleted: boolean;
+  /** How many lights are shown together, itself among them. */
+  sharing: number;
 }
 
 /** How far the solution is. */
@@ -113,6 +115,8 @@ export interface Share {
 /** What stands at a point. */
 export interface ProbeAnswer {
   illuminance: number;
+  /** One standard error of it by the rays of the place, lx. */
+  error: number;
   irradiance: [number, number, number];
   reflectance: [number, number, number];
   radiosity: [number, number, number];

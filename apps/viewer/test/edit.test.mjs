@@ -98,6 +98,37 @@ test('a thing is dragged, and light follows while it is and as a batch solve has
   await page.context().close();
 });
 
+test('a key that is held is one gesture: light follows while it is, and it is undone at once', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const { edits } = (await state(page)).status;
+  const block = await named(page, 'short block');
+  await page.evaluate((id) => window.radiosity.app.select(id), block.id);
+  await page.locator('canvas').first().focus();
+  const seen = [];
+  for (let i = 0; i < 20; i += 1) {
+    await page.keyboard.down('k');
+    seen.push((await state(page)).status.latency);
+    await page.waitForTimeout(30);
+  }
+  await page.keyboard.up('k');
+  assert.ok(new Set(seen).size > 2, `pictures came meanwhile: ${seen}`);
+  await done(page, edits + 1);
+  assert.notDeepEqual((await named(page, 'short block')).matrix, block.matrix);
+  // What is held adds once.
+  for (let i = 0; i < 5; i += 1) await page.keyboard.down('Control+d');
+  await page.keyboard.up('Control+d');
+  await page.waitForTimeout(300);
+  await done(page);
+  assert.equal((await state(page)).objects.filter(({ name, deleted }) => name === 'short block' && !deleted).length, 10);
+  await page.keyboard.press('Control+z');
+  await page.keyboard.press('Control+z');
+  await page.waitForFunction((id) => window.radiosity.state().objects.find((object) => object.id === id).matrix[12] === 0, block.id);
+  await restored(page);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('two pages drag a thing each at once, one loses its connection meanwhile, and both have the light of both', async () => {
   const [one, two] = [await pages.open(program.url), await pages.open(program.url)];
   await Promise.all([done(one), done(two)]);

@@ -142,6 +142,28 @@ test('points of a grid beneath things are left out and counted', async () => {
   assert.deepEqual(await page.evaluate(() => window.radiosity.app.measuring.grid.normal.toArray().map(Math.round)), [0, 1, 0]);
   await page.keyboard.press('Control+z');
   await page.waitForFunction((covered) => window.radiosity.state().grid.covered === covered, laid.covered);
+  // A block that comes to stand where the floor was picked covers what is beneath it all the same.
+  const shift = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const { x, z } = app.measuring.probed.hit.point;
+    const shift = [x - 0.186, z - 0.169];
+    app.editAll([...app.objects.values()].filter(({ name }) => name === 'short block')
+      .map(({ id }) => ({ move: { object: id, matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, shift[0], 0, shift[1], 1] } })));
+    return shift;
+  });
+  await done(page, edits + 3);
+  await page.waitForTimeout(300);
+  const over = await page.evaluate(() => window.radiosity.app.measuring.grid.points.map(({ point: { x, z }, isCovered }) => [x, z, isCovered]));
+  const moved = blocks[0].map(([x, z]) => [x + shift[0], z + shift[1]]);
+  for (const [x, z, isCovered] of over) {
+    const isUnder = [moved, blocks[1]].some((corners) => corners.every(([x0, z0], k) => {
+      const [x1, z1] = corners[(k + 1) % 4];
+      return (x1 - x0) * (z - z0) - (z1 - z0) * (x - x0) > 0;
+    }));
+    assert.equal(isCovered, isUnder, `${x} ${z}`);
+  }
+  await page.keyboard.press('Control+z');
+  await page.waitForFunction((covered) => window.radiosity.state().grid.covered === covered, laid.covered);
   // The lid of a block that stands askew: rows run along its sides.
   const lid = await page.evaluate(() => {
     const { app } = window.radiosity;
@@ -230,7 +252,7 @@ test('a working plane lies in the air of the room, as `measure` has it, and foll
   // What is saved is what `measure` reads.
   const [download] = await Promise.all([page.waitForEvent('download'), page.locator('#grid button', { hasText: 'CSV' }).click()]);
   const [names, ...rows] = readFileSync(await download.path(), 'utf8').trim().split('\n');
-  assert.deepEqual([names, rows.length, download.suggestedFilename()], ['x,y,z,nx,ny,nz,illuminance_lux', after.points.length, 'cornell-box-plane.csv']);
+  assert.deepEqual([names, rows.length, download.suggestedFilename()], ['x,y,z,nx,ny,nz,page_lux', after.points.length, 'cornell-box-plane.csv']);
   rows.forEach((row, i) => {
     const [x, y, z, nx, ny, nz, lx] = row.split(',').map(Number);
     const [px, py, pz, right] = after.points[i];
@@ -629,6 +651,8 @@ test('malformed messages are refused and nothing is lost', async () => {
     '{"kind":"edit","edit":{"light":{"light":0,"dimming":-1,"colour":[1,1,1]}}}',
     `{"kind":"edit","edit":${'{"several":['.repeat(3000)}${']}'.repeat(3000)}}`,
     '{"kind":"probe","question":1,"object":4000000000,"triangle":4000000000,"uv":[5,5]}',
+    `{"kind":"survey","question":1,"object":0,"places":[${'[0,0.1,0.1],'.repeat(4000)}[0,0.1,0.1]]}`,
+    `"${'x'.repeat(1 << 20)}"`,
     '{"kind":"bookmark","camera":{"name":"","matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"fov":1}}',
   ];
   for (const text of wrong) {
@@ -638,7 +662,7 @@ test('malformed messages are refused and nothing is lost', async () => {
   }
   assert.ok((await state(page)).isConnected);
   // One that is too long ends the connection; the page comes back.
-  await offline(page, () => page.evaluate(() => window.radiosity.app.connection.sendRaw('x'.repeat(1 << 20))));
+  await offline(page, () => page.evaluate(() => window.radiosity.app.connection.sendRaw('x'.repeat(3 << 20))));
   await online(page);
   await done(page);
   assert.deepEqual(await lux(), before);

@@ -4,7 +4,7 @@
 mod room;
 
 use glam::{DAffine3, DMat3, DMat4, DVec3};
-use radiosity::session::{Edit, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed};
+use radiosity::session::{Edit, NewLight, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed};
 use radiosity::{Material, PointLight, PointLightKind, Scene};
 use room::{Furnishing, room};
 use std::time::Duration;
@@ -127,4 +127,33 @@ fn the_error_in_sight_is_without_the_noise_of_its_readings() {
     assert!(session.places_in_sight(&away, 0.5, 1.0).is_empty(), "there is nothing");
     assert!(session.places_in_sight(&[f64::NAN; 16], 0.5, 1.0).is_empty(), "that is no camera");
     assert_eq!(read(&session, Vec::new()).off, None);
+}
+
+/// Lamps that were added and taken away again, and one that is off, take no rays: readings are those of a scene without them.
+#[test]
+fn what_is_gone_leaves_no_trace_in_readings() {
+    let options = SessionOptions { elements: 300, rays: 16, ..SessionOptions::default() };
+    let mut session = Session::new(radiosity::cornell_box(), &options).unwrap();
+    finish(&mut session);
+    let place = |triangle| SurfacePlace { object: ObjectId(0), triangle, uv: [0.3, 0.3] };
+    let places: Vec<SurfacePlace> = (0..2).map(place).collect();
+    let before = read(&session, places.clone()).readings;
+    for k in 0..12 {
+        let light = NewLight {
+            name: format!("lamp {k}"),
+            kind: PointLightKind::Point,
+            position: [0.2 + 0.01 * f64::from(k), 0.3, 0.3],
+            direction: [0.0, -1.0, 0.0],
+            intensity: [10.0; 3],
+        };
+        let added = session.apply(&Edit::AddLight { light }).unwrap().added_lights[0];
+        let gone = if k == 0 {
+            Edit::Light { light: added, dimming: 0.0, colour: [1.0; 3] }
+        } else {
+            Edit::DeleteLight { light: added }
+        };
+        session.apply(&gone).unwrap();
+    }
+    finish(&mut session);
+    assert_eq!(read(&session, places).readings, before);
 }

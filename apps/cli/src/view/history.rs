@@ -31,7 +31,7 @@ impl History {
         // The first inverse leads back to before the gesture. Gestures of other pages may go on beside it.
         let mut going_on = self.done.iter().rev().take_while(|change| change.gesture.is_some());
         let is_known = |of: &Change| of.gesture == gesture && targets(&of.edit) == targets(&inverse);
-        if gesture.is_some() && going_on.any(is_known) {
+        if gesture.is_some() && is_absolute(&inverse) && going_on.any(is_known) {
             return;
         }
         if self.done.len() == LONGEST {
@@ -85,12 +85,25 @@ pub enum Target {
     NewLight,
 }
 
-/// Whether an edit adds anything: then it is outdated by no other.
-pub fn adds(edit: &Edit) -> bool {
+/// Whether an edit says how things shall be, whatever they are: then a later one of the same targets outdates it.
+pub fn is_absolute(edit: &Edit) -> bool {
     match edit {
-        Edit::Add { .. } | Edit::AddLight { .. } | Edit::Copy { .. } | Edit::CopyLight { .. } => true,
-        Edit::Several(edits) => edits.iter().any(adds),
-        _ => false,
+        Edit::Light { .. }
+        | Edit::MoveLight { .. }
+        | Edit::ChangeLight { .. }
+        | Edit::Reflectance { .. }
+        | Edit::Move { .. }
+        | Edit::Reshape { .. } => true,
+        Edit::Several(edits) => edits.iter().all(is_absolute),
+        Edit::Add { .. }
+        | Edit::AddLight { .. }
+        | Edit::Copy { .. }
+        | Edit::CopyLight { .. }
+        | Edit::Delete { .. }
+        | Edit::DeleteLight { .. }
+        | Edit::Restore { .. }
+        | Edit::RestoreLight { .. }
+        | Edit::Exchange { .. } => false,
     }
 }
 
@@ -216,6 +229,17 @@ mod tests {
         history.did("dim".into(), dim(1, 1.0), None);
         history.did("dim".into(), dim(0, 0.5), Some((0, 8)));
         assert_eq!(history.next_undo(), Some(&dim(0, 0.5)));
+    }
+
+    #[test]
+    fn what_is_taken_away_and_brought_back_in_one_gesture_is_undone_step_by_step() {
+        let mut history = History::default();
+        let object = ObjectId(3);
+        history.did("delete".into(), Edit::Restore { object }, Some((1, 1)));
+        history.did("restore".into(), Edit::Delete { object }, Some((1, 1)));
+        assert_eq!(history.next_undo(), Some(&Edit::Delete { object }));
+        history.undid(Edit::Restore { object });
+        assert_eq!(history.next_undo(), Some(&Edit::Restore { object }));
     }
 
     #[test]

@@ -4,21 +4,21 @@ use super::board::{Board, MOST_LAYERS, Notice, Seen};
 use super::files;
 use super::guard::{Guard, Refusal};
 use super::solver::{Command, Export};
-use super::wire::{self, LONGEST, Refused, Request, Say};
+use super::wire::{self, LONGEST, MOST_PLACES, Refused, Request, Say};
 use axum::Router;
 use axum::body::{Body, Bytes};
-use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, Request as HttpRequest, State};
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use radiosity::session::Layer;
+use radiosity::session::{Layer, MOST_BOUNCES};
 use radiosity::{Scene, Texture};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::time::MissedTickBehavior;
 
 /// The page, as `cargo xtask viewer` makes it.
@@ -55,6 +55,8 @@ pub struct Server {
     textures: Vec<Texture>,
     pages: AtomicUsize,
     next_page: AtomicU64,
+    /// Models that are being written for people.
+    downloads: Semaphore,
     pace: Pace,
 }
 
@@ -63,7 +65,16 @@ impl Server {
     pub fn new(guard: Guard, board: Arc<Board>, commands: mpsc::Sender<Command>, scene: &Scene) -> Arc<Server> {
         let textures = scene.textures.clone();
         let (pages, next_page) = (AtomicUsize::new(0), AtomicU64::new(0));
-        Arc::new(Server { guard, board, commands, textures, pages, next_page, pace: PACE })
+        Arc::new(Server {
+            guard,
+            board,
+            commands,
+            textures,
+            pages,
+            next_page,
+            downloads: Semaphore::new(1),
+            pace: PACE,
+        })
     }
 
     /// All that is answered.
@@ -145,6 +156,8 @@ async fn download(
     suffix: &str,
     write: fn(Export) -> Result<Vec<u8>, radiosity::io::gltf_out::WriteError>,
 ) -> Response {
+    // One at a time: each has the scene once more.
+    let Ok(_turn) = server.downloads.acquire().await else { return StatusCode::SERVICE_UNAVAILABLE.into_response() };
     let (sender, wanted) = oneshot::channel();
     if server.commands.send(Command::Export(sender)).await.is_err() {
         return StatusCode::SERVICE_UNAVAILABLE.into_response();
@@ -170,7 +183,7 @@ async fn socket(State(server): State<Arc<Server>>, upgrade: WebSocketUpgrade) ->
         let text = format!("{MOST_PAGES} pages look at this scene already; close one\n");
         return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
     }
-    upgrade.max_message_size(LONGEST).max_frame_size(LONGEST).on_upgrade(move |socket| serve(place, socket))
+    upgrade.max_message_size(2 * LONGEST).max_frame_size(2 * LONGEST).on_upgrade(move |socket| serve(place, socket))
 }
 
 /// The place of a page among those that there may be.
@@ -264,13 +277,7 @@ async fn serve(place: Place, mut socket: WebSocket) {
                         return;
                     }
                 }
-                Some(Err(error)) => {
-                    // Says why, where the connection still stands: a message that was too long.
-                    let reason = format!("{error}").into();
-                    send(&mut socket, Message::Close(Some(CloseFrame { code: close_code::SIZE, reason }))).await;
-                    return;
-                }
-                None => return,
+                _ => return,
             },
             Some(text) = answers.recv() => {
                 if !send(&mut socket, Message::Text(text.into())).await {
@@ -312,12 +319,23 @@ async fn receive(
         Message::Close(_) => return false,
         Message::Ping(_) | Message::Pong(_) => return true,
     };
+    if text.len() > LONGEST {
+        return refuse(answer, &format!("it has {} bytes, and {LONGEST} is the most", text.len()));
+    }
     let request: Request = match serde_json::from_str(text) {
         Ok(request) => request,
         Err(error) => return refuse(answer, &error.to_string()),
     };
     let command = match request {
+        Request::Survey { places, .. } if places.len() > MOST_PLACES => {
+            return refuse(
+                answer,
+                &format!("{} places are to be measured, and {MOST_PLACES} are the most", places.len()),
+            );
+        }
         Request::Layer { layer, epoch } => {
+            // Later bounces show the last.
+            let layer = if let Layer::Bounce(n) = layer { Layer::Bounce(n.min(MOST_BOUNCES)) } else { layer };
             // The new one first, so that light of a layer that stays is kept.
             *watch = Some(Watch::new(&server.board, layer, epoch));
             seen.forget_light();

@@ -59,6 +59,11 @@ pub struct Solver {
     cameras: Vec<CameraPlace>,
     /// Objects whose light has changed.
     changed: BTreeSet<ObjectId>,
+    /// Objects that came or came back, whose light is told when it is known: it may be what it was when they went, but not what
+    /// was told last.
+    back: BTreeSet<ObjectId>,
+    /// Who wants all there is, when the last edit is seen.
+    exports: Vec<oneshot::Sender<Export>>,
     /// Layers that pages look at.
     shown: Vec<Shown>,
     last_post: Option<Instant>,
@@ -88,8 +93,10 @@ struct Asked {
     answer: mpsc::Sender<String>,
 }
 
-/// What is measured at many points.
+/// What is measured.
 enum Measured {
+    /// A picked place, where light comes from, too.
+    Place(SurfacePlace, Survey),
     Plane(Box<Plane>),
     /// A grid over a surface.
     Places(Survey),
@@ -98,9 +105,13 @@ enum Measured {
 }
 
 impl Measured {
-    /// A page looks from one place, and has one grid or plane.
-    fn is_sight(&self) -> bool {
-        matches!(self, Measured::Sight(_))
+    /// A page picks one place, has one grid or plane, and looks from one place. What is least work comes first.
+    fn kind(&self) -> u8 {
+        match self {
+            Measured::Place(..) => 0,
+            Measured::Plane(_) | Measured::Places(_) => 1,
+            Measured::Sight(_) => 2,
+        }
     }
 }
 
@@ -139,7 +150,7 @@ impl Part {
     fn of(command: &Command) -> Option<Part> {
         match command {
             Command::Ask { page, request: Request::Edit { edit, gesture: Some(gesture) }, .. } => {
-                (!history::adds(edit)).then(|| Part { page: *page, gesture: *gesture, targets: targets(edit) })
+                (history::is_absolute(edit)).then(|| Part { page: *page, gesture: *gesture, targets: targets(edit) })
             }
             _ => None,
         }
@@ -166,6 +177,8 @@ impl Solver {
             history: History::default(),
             cameras: Vec::new(),
             changed: BTreeSet::new(),
+            back: BTreeSet::new(),
+            exports: Vec::new(),
             shown: Vec::new(),
             last_post: None,
             is_done: false,
@@ -205,6 +218,7 @@ impl Solver {
                 return;
             }
             self.turn();
+            self.hand_out();
             // Nothing wakes this thread when a page reads its answers.
             let is_stuck = !self.measured.is_empty() && self.measured.iter().all(Asked::is_full);
             if is_stuck && self.is_done && self.held.is_empty() {
@@ -239,6 +253,11 @@ impl Solver {
             Command::Ask { page, request: Request::Plane { question, about }, answer } => {
                 self.ask(Asked { page, question, what: Measured::Plane(Box::new(Plane::new(about))), answer });
             }
+            Command::Ask { page, request: Request::Probe { question, object, triangle, uv }, answer } => {
+                let place = SurfacePlace { object, triangle, uv };
+                let what = Measured::Place(place, Survey::new(vec![place]));
+                self.ask(Asked { page, question, what, answer });
+            }
             Command::Ask { page, request: Request::Survey { question, object, places }, answer } => {
                 let place = |(triangle, v, w)| SurfacePlace { object, triangle, uv: [v, w] };
                 let survey = Survey::new(places.into_iter().map(place).collect());
@@ -255,10 +274,7 @@ impl Solver {
                 }
             }
             Command::Watch => {}
-            Command::Export(wanted) => {
-                // Whoever has gone away needs nothing.
-                let _ = wanted.send(self.export());
-            }
+            Command::Export(wanted) => self.exports.push(wanted),
             Command::Stop => return false,
         }
         true
@@ -266,8 +282,9 @@ impl Solver {
 
     /// In place of what the page asked of that kind before.
     fn ask(&mut self, asked: Asked) {
-        self.measured.retain(|other| other.page != asked.page || other.what.is_sight() != asked.what.is_sight());
-        self.measured.push(asked);
+        self.measured.retain(|other| other.page != asked.page || other.what.kind() != asked.what.kind());
+        let before = self.measured.iter().filter(|other| asked.what.kind() > 0 || other.what.kind() == 0).count();
+        self.measured.insert(before, asked);
     }
 
     fn answer(&mut self, page: u64, request: &Request, since: Instant) -> Option<String> {
@@ -294,14 +311,11 @@ impl Solver {
                 None
             }
             // The board keeps who looks at what, and what is measured waits until there is time.
-            Request::Layer { .. } | Request::Plane { .. } | Request::Survey { .. } | Request::InSight { .. } => None,
-            Request::Probe { question, object, triangle, uv } => {
-                let is_place = uv.iter().all(|x| x.is_finite());
-                let probe = self.session.probe(*object, *triangle, *uv).filter(|_| is_place);
-                let mut here = Survey::new(vec![SurfacePlace { object: *object, triangle: *triangle, uv: *uv }]);
-                let here = self.session.survey(&mut here, Duration::ZERO).and_then(|found| found.readings[0]);
-                Some(Say::Probe { question: *question, answer: probe.map(|probe| self.read(&probe, here)) }.text())
-            }
+            Request::Layer { .. }
+            | Request::Probe { .. }
+            | Request::Plane { .. }
+            | Request::Survey { .. }
+            | Request::InSight { .. } => None,
             Request::Rays { question, object, triangle } => {
                 Some(Say::Rays { question: *question, rays: self.session.rays(*object, *triangle) }.text())
             }
@@ -361,6 +375,9 @@ impl Solver {
             let step = self.session.step(budget);
             self.changed.extend(step.changed);
             (self.is_done, is_complete) = (step.is_done, step.is_complete || step.is_done);
+            if is_complete {
+                self.changed.append(&mut self.back);
+            }
             let status = self.session.status();
             if self.is_done {
                 self.settled = self.settling.take().map(|since| since.elapsed().as_secs_f64()).or(self.settled);
@@ -423,6 +440,14 @@ impl Solver {
             let left = until.saturating_duration_since(Instant::now());
             let question = self.measured[next].question;
             let text = match &mut self.measured[next].what {
+                Measured::Place(place, survey) => {
+                    let (place, surveyed) = (*place, self.session.survey(survey, left));
+                    surveyed.map(|surveyed| {
+                        let probe = self.session.probe(place.object, place.triangle, place.uv);
+                        let answer = probe.zip(surveyed.readings[0]).map(|(probe, here)| self.read(&probe, here));
+                        Say::Probe { question, answer }.text()
+                    })
+                }
                 Measured::Plane(plane) => {
                     let measured = self.session.measure_plane(plane, left).transpose();
                     measured.map(|measured| self.tell_plane(question, measured))
@@ -436,14 +461,28 @@ impl Solver {
                     surveyed.map(|surveyed| Say::InSight { question, error: surveyed.off }.text())
                 }
             };
-            let Some(text) = text else { return };
             let asked = self.measured.remove(next);
+            let Some(text) = text else {
+                // Others have the next turn.
+                self.measured.push(asked);
+                return;
+            };
             // A page asks nothing else of the kind before it has this.
             if let Err(TrySendError::Full(_)) = asked.answer.try_send(text) {
                 self.measured.push(asked);
             }
             if left.is_zero() {
                 return;
+            }
+        }
+    }
+
+    /// Gives everyone who wants it all there is, with the light of the last edit.
+    fn hand_out(&mut self) {
+        if self.edited.is_none() {
+            for wanted in std::mem::take(&mut self.exports).into_iter().filter(|wanted| !wanted.is_closed()) {
+                // Whoever has gone away meanwhile needs nothing.
+                let _ = wanted.send(self.export());
             }
         }
     }
@@ -475,6 +514,7 @@ fn not_kept(why: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::board::Seen;
     use super::*;
     use radiosity::session::{PlaneQuestion, SessionOptions};
 
@@ -505,6 +545,37 @@ mod tests {
         assert_eq!((solver.held.len(), solver.edits), (0, 3));
         let x = |object: ObjectId| solver.model.objects[object.0 as usize].matrix[12];
         assert_eq!(blocks.iter().map(|block| x(*block)).collect::<Vec<_>>(), [0.02, 0.0]);
+    }
+
+    /// What was deleted in the light and comes back in the dark is dark.
+    #[test]
+    fn what_comes_back_has_the_light_of_now() {
+        let options = SessionOptions { elements: 200, rays: 16, ..SessionOptions::default() };
+        let session = Session::new(radiosity::cornell_box(), &options).unwrap();
+        let board = Arc::new(Board::new());
+        board.watch(Layer::Total);
+        let mut solver = Solver::new(session, None, board.clone());
+        // Whether the board has light of an object, as a page that comes then is sent it.
+        let is_lit = |solver: &mut Solver, object: ObjectId| {
+            while !solver.is_done {
+                solver.turn();
+            }
+            let mut seen = Seen::default();
+            let frames = std::iter::from_fn(|| Some(board.next_light(Layer::Total, &mut seen)));
+            let chunks = frames.take_while(|chunks| !chunks.is_empty()).flatten();
+            chunks.filter(|chunk| chunk.object == object.0).any(|chunk| chunk.values.iter().any(|value| *value != 0))
+        };
+        let block = solver.model.objects.iter().find(|object| object.name.contains("block")).unwrap().id;
+        assert!(is_lit(&mut solver, block));
+        let (answer, _answers) = mpsc::channel(1);
+        let ask = |request: Request| Command::Ask { page: 0, request, answer: answer.clone() };
+        let off = Edit::Light { light: solver.model.lights[0].id, dimming: 0.0, colour: [1.0; 3] };
+        for edit in [off, Edit::Delete { object: block }] {
+            assert!(solver.take(ask(Request::Edit { edit, gesture: None })));
+        }
+        is_lit(&mut solver, block);
+        assert!(solver.take(ask(Request::Undo {})));
+        assert!(!is_lit(&mut solver, block), "it is dark");
     }
 
     /// A page that has not read other answers gets its plane when it has; meanwhile other pages get theirs.

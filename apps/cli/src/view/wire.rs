@@ -17,8 +17,11 @@ use radiosity::{Bands, Scene, Surface, Texture, TextureRef, Wrap};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 
-/// Most bytes of a message from a page. An edit of hundreds of things at once has as many.
-pub const LONGEST: usize = 256 << 10;
+/// Most bytes of a message from a page: an edit of thousands of things at once has as many.
+pub const LONGEST: usize = 1 << 20;
+
+/// Most places of a survey, as many as a page's finest grid has.
+pub const MOST_PLACES: usize = 4000;
 
 /// Light that a half float of 1 stands for, lx: they reach 65504, and sunlight is brighter than that.
 const UNIT: f32 = 16.0;
@@ -153,6 +156,8 @@ pub enum Say<'a> {
         direction: Option<[f64; 3]>,
         object: Option<ObjectId>,
         deleted: bool,
+        /// How many lights are shown together, itself among them.
+        sharing: usize,
     },
     Bookmarks {
         cameras: &'a [CameraPlace],
@@ -248,6 +253,8 @@ pub struct Status {
 #[derive(Clone, Debug, Serialize)]
 pub struct ProbeAnswer {
     pub illuminance: f32,
+    /// One standard error of it by the rays of the place, lx.
+    pub error: f32,
     pub irradiance: Bands,
     pub reflectance: Bands,
     pub radiosity: Bands,
@@ -367,6 +374,7 @@ pub fn light(light: &ModelLight) -> String {
         direction: light.direction,
         object: light.object,
         deleted: light.deleted,
+        sharing: light.sharing,
     }
     .text()
 }

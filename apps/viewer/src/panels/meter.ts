@@ -29,6 +29,7 @@ export function meterPanel(app: App): HTMLElement {
     lux.replaceChildren(readable(answer.illuminance), el('span', { class: 'unit' }, 'lx'));
     const point = app.stage.toScene(probed.hit.point);
     facts.replaceChildren(
+      fact('Noise', `± ${readable(answer.error)} lx`),
       fact('Reflectance', el('span', {}, el('i', { class: 'swatch', style: `background:${hex(answer.reflectance)}` }), `${(100 * luminance(answer.reflectance)).toFixed(1)} %`)),
       fact('Radiosity', `${readable(luminance(answer.radiosity))} lm/m²`),
       fact('Luminance', `${readable(luminance(answer.radiosity) / Math.PI)} cd/m²`),

@@ -54,12 +54,12 @@ export function thingPanel(app: App): HTMLElement {
     if (!placed || !spot || !app.scene) return;
     if (axis !== null) {
       const way = new Vector3().setComponent(axis, places[axis].valueAsNumber - app.stage.toScene(spot).getComponent(axis));
-      if (way.length() < FAR * app.stage.bounds.getSize(new Vector3()).length()) return app.nudge(way.applyQuaternion(app.stage.root.quaternion), 0);
+      if (way.length() < FAR * app.stage.bounds.getSize(new Vector3()).length()) return app.nudge(way.applyQuaternion(app.stage.root.quaternion), 0, 0, app.stepped());
       app.refuse(`That is far outside of the scene: ${'XYZ'[axis]} is as before.`);
       show();
     } else {
       const angle = ((turn.valueAsNumber - turnOf(placed.matrix, new Vector3(...app.scene.up))) * Math.PI) / 180;
-      if (Number.isFinite(angle)) app.nudge(new Vector3(), angle);
+      if (Number.isFinite(angle)) app.nudge(new Vector3(), angle, 0, app.stepped());
     }
   };
   // What makes a lamp without area what it is.
@@ -118,7 +118,7 @@ export function thingPanel(app: App): HTMLElement {
   }));
   const tilt = el('input', {
     type: 'number', step: 5, 'aria-label': 'Tilt about its own width, degrees', title: 'Tilt about its own width, degrees',
-    change: () => (Number.isFinite(tilt.valueAsNumber) && app.adding.parts().length > 0 ? app.nudge(new Vector3(), 0, (tilt.valueAsNumber * Math.PI) / 180 - app.adding.tilt()) : show()),
+    change: () => (Number.isFinite(tilt.valueAsNumber) && app.adding.parts().length > 0 ? app.nudge(new Vector3(), 0, (tilt.valueAsNumber * Math.PI) / 180 - app.adding.tilt(), app.stepped()) : show()),
   });
   const sizing = el('div', { class: 'numbers' }, ...lengths.map((input, k) => el('label', {}, el('span', { class: 'quiet' }, 'WDH'[k]), input)),
     el('label', {}, el('span', { class: 'quiet' }, 'Tilt °'), tilt));

@@ -15,6 +15,7 @@ export function layerName(app: App, layer: Layer): string {
   if (layer === 'relative_error') return 'Noise of rays, % of the light there';
   if ('bounce' in layer) return layer.bounce === 1 ? 'First bounce' : `Bounce ${layer.bounce}`;
   const light = app.lights.get(layer.light);
+  if (light && light.sharing > 1) return `${light.sharing} more lights together`;
   return light ? app.lightName(light) : `Light ${layer.light + 1}`;
 }
 
@@ -62,16 +63,19 @@ export function viewPanel(app: App): HTMLElement {
 
   const options = () => {
     const option = (value: Layer) => el('option', { value: JSON.stringify(value) }, layerName(app, value));
-    const lights = [...app.lights.values()].filter((light) => !light.deleted).map((light) => option({ light: light.id }));
+    const there = [...app.lights.values()].filter((light) => !light.deleted);
+    // Those that are shown together are one choice: the first of them.
+    const first = there.find(({ sharing }) => sharing > 1);
+    const lights = there.filter((light) => light.sharing === 1 || light === first).map((light) => option({ light: light.id }));
     const bounces = Array.from({ length: BOUNCES }, (_, i) => option({ bounce: i + 1 }));
     layer.replaceChildren(option('total'), option('direct'), option('indirect'),
       el('optgroup', { label: 'Bounces' }, ...bounces), lights.length > 0 ? el('optgroup', { label: 'Lights alone' }, ...lights) : '',
-      el('optgroup', { label: 'Estimated error' }, option('relative_error'), option('error')));
+      el('optgroup', { label: 'Noise of rays' }, option('relative_error'), option('error')));
     layer.value = JSON.stringify(app.layer);
   };
   let names = '';
   app.on('lights', () => {
-    const now = [...app.lights.values()].map((light) => `${light.name} ${light.deleted}`).join('\n');
+    const now = [...app.lights.values()].map((light) => `${light.name} ${light.deleted} ${light.sharing}`).join('\n');
     if (now !== names || layer.options.length === 0) options();
     names = now;
   });

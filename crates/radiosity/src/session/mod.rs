@@ -53,6 +53,7 @@ pub use added::{Form, NewObject};
 pub use edit::{Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MOST_INTENSITY, MOST_LIGHTS, NewLight};
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 pub use plane::{Plane, PlaneError, PlaneFigures, PlanePoint, PlaneQuestion, PlaneReading};
+pub use probe::MOST_BOUNCES;
 pub use survey::{Reading, SurfacePlace, Survey, Surveyed};
 
 use crate::Error;

@@ -122,6 +122,8 @@ pub struct ModelLight {
     pub object: Option<ObjectId>,
     /// Whether it was taken away, or its object.
     pub deleted: bool,
+    /// How many lights are there whose light is not told from its own, itself among them: 1, or more beyond the 31st.
+    pub sharing: usize,
 }
 
 /// One camera, looking along −Z of its frame with +Y up.
@@ -181,6 +183,6 @@ pub struct Probe {
     pub error: f32,
     /// What each light brings, reflected light too, brightest first; before columns are solved, direct light only.
     pub lights: Vec<(LightId, Bands)>,
-    /// What the brightest objects send here of what they reflect, brightest first.
+    /// What objects send here of what they reflect, brightest first.
     pub objects: Vec<(ObjectId, Bands)>,
 }

@@ -18,6 +18,7 @@ use radiosity_transport::live::Bounds;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 /// Cosine up to which a surface is level: one degree.
@@ -130,7 +131,7 @@ pub struct PlaneFigures {
     pub uniformity: f32,
     /// Points that are left out as they are within things.
     pub covered: usize,
-    /// Points above the surface that are left out as they lie in the zone along walls; things of 2 m, and what cannot be moved, are
+    /// Points above the surface that are left out as they lie in the zone along the walls of this room; things of 2 m, and what cannot be moved, are
     /// walls.
     pub walled: usize,
     /// One standard error of a point, in the root mean square, over the mean: by rays alone, the elements' size is not in it.
@@ -188,6 +189,19 @@ impl Layout {
     /// A point so high above the surface.
     fn point(&self, at: DVec2, height: f64) -> DVec3 {
         self.origin + at.x * self.axes[0] + at.y * self.axes[1] + height * self.normal
+    }
+
+    /// The cells beside one.
+    fn beside(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
+        let [columns, rows] = self.counts;
+        let (i, j) = (cell % columns, cell / columns);
+        let beside = [
+            (i > 0).then(|| cell - 1),
+            (i + 1 < columns).then(|| cell + 1),
+            (j > 0).then(|| cell - columns),
+            (j + 1 < rows).then(|| cell + columns),
+        ];
+        beside.into_iter().flatten()
     }
 }
 
@@ -340,6 +354,27 @@ impl Session {
         Cell::Free(self.receive(meter, point + world.middle, layout.normal))
     }
 
+    /// How many cells lie along the walls of the cells that were reached: from these on, as far as the zone is wide in a corner.
+    fn zone(&self, layout: &Layout, plane: &Plane, is_reached: &[bool]) -> usize {
+        let PlaneQuestion { height, border, .. } = plane.question;
+        let seen = |cell: usize| layout.point(layout.middle(cell), height.max(SKIRTING));
+        let width = std::f64::consts::SQRT_2 * border + layout.cell.length();
+        let mut is_known = is_reached.to_vec();
+        let mut waiting: VecDeque<(usize, usize)> =
+            (0..is_known.len()).filter(|cell| is_known[*cell]).map(|cell| (cell, cell)).collect();
+        let mut count = 0;
+        while let Some((cell, from)) = waiting.pop_front() {
+            for next in layout.beside(cell).filter(|next| plane.cells[*next] == Cell::Walled) {
+                let is_near = layout.middle(next).distance(layout.middle(from)) <= width;
+                if !is_known[next] && is_near && !self.is_walled(layout, seen(cell), seen(next)) {
+                    (is_known[next], count) = (true, count + 1);
+                    waiting.push_back((next, from));
+                }
+            }
+        }
+        count
+    }
+
     /// The points that are in the room of the picked place, and what they say together.
     fn read_plane(&self, layout: &Layout, plane: &Plane) -> Result<PlaneReading, PlaneError> {
         let PlaneQuestion { object, triangle, uv, height, .. } = plane.question;
@@ -359,16 +394,8 @@ impl Session {
         let mut is_reached = vec![false; plane.cells.len()];
         let mut waiting = vec![first];
         is_reached[first] = true;
-        let [columns, rows] = layout.counts;
         while let Some(cell) = waiting.pop() {
-            let (i, j) = (cell % columns, cell / columns);
-            let beside = [
-                (i > 0).then(|| cell - 1),
-                (i + 1 < columns).then(|| cell + 1),
-                (j > 0).then(|| cell - columns),
-                (j + 1 < rows).then(|| cell + columns),
-            ];
-            for next in beside.into_iter().flatten().filter(|next| open(*next)) {
+            for next in layout.beside(cell).filter(|next| open(*next)) {
                 let [from, to] = [cell, next].map(|cell| seen(layout.middle(cell)));
                 if !is_reached[next] && !self.is_walled(layout, from, to) {
                     is_reached[next] = true;
@@ -376,6 +403,8 @@ impl Session {
                 }
             }
         }
+
+        let walled = self.zone(layout, plane, &is_reached);
 
         let point = |(cell, of): (usize, &Cell)| match of {
             Cell::Free(halves) if is_reached[cell] => {
@@ -409,7 +438,7 @@ impl Session {
             most: points.iter().map(|point| point.lux).fold(0.0, f32::max),
             uniformity: over(f64::from(least)),
             covered,
-            walled: plane.cells.iter().filter(|cell| **cell == Cell::Walled).count(),
+            walled,
             error: over(square.sqrt()),
         };
         Ok(PlaneReading { points, figures })

@@ -7,11 +7,8 @@ use radiosity_scene::{Bands, PointLightKind, Projection, Side, luminance};
 use radiosity_transport::live::{Chunk, Lanes};
 use std::sync::Arc;
 
-/// Objects and lights that a probe tells of, at most.
-const MOST_TOLD: usize = 8;
-
 /// Bounces that are told apart; later ones show the last.
-const MOST_BOUNCES: u32 = 64;
+pub const MOST_BOUNCES: u32 = 64;
 
 /// Layers that are kept, so that several pages may look at several, and bounces follow from those before them.
 const MOST_KEPT: usize = 8;
@@ -132,6 +129,9 @@ impl Session {
 
     fn model_lights(&self) -> Vec<ModelLight> {
         let world = self.live.world();
+        let is_gone = |light: &super::Light| light.is_gone || !self.is_there(light);
+        let mut there = vec![0; self.strands.len()];
+        self.lights.iter().filter(|light| !is_gone(light)).for_each(|light| there[light.strand] += 1);
         let of = |(index, light): (usize, &super::Light)| {
             let placed = light.placed();
             let position = match (light.body, &placed, light.kind) {
@@ -161,7 +161,8 @@ impl Session {
                 direction: direction.map(|point| point.direction.to_array()),
                 matrix: light.body.map_or(light.matrix, |body| self.objects[body].matrix),
                 object: light.body.map(|body| ObjectId(body as u32)),
-                deleted: light.is_gone || !self.is_there(light),
+                deleted: is_gone(light),
+                sharing: there[light.strand].max(1),
             }
         };
         self.lights.iter().enumerate().map(of).collect()
@@ -422,7 +423,6 @@ impl Session {
         let brightest = |list: &mut Vec<(u32, Bands)>| {
             list.retain(|(_, light)| luminance(*light) > 0.0);
             list.sort_by(|a, b| luminance(b.1).total_cmp(&luminance(a.1)).then(a.0.cmp(&b.0)));
-            list.truncate(MOST_TOLD);
         };
         let mut objects: Vec<(u32, Bands)> = objects.into_iter().map(|(body, light)| (body as u32, light)).collect();
         brightest(&mut objects);

@@ -61,7 +61,7 @@ pub struct Surveyed {
     /// In the order of the places; none where an object is gone.
     pub readings: Vec<Option<Reading>>,
     /// How far what is shown is off at these places, over the light there, in the root mean square; the noise of the readings
-    /// themselves is not in it. None where there is no light.
+    /// themselves is not in it. No less than one standard error of it, as far as these places tell. None where there is no light.
     pub off: Option<f64>,
 }
 
@@ -94,8 +94,10 @@ impl Session {
         if state.is_edited || state.solved_rays == 0 || state.given.len() != self.live.ids() {
             return None;
         }
-        let columns: Vec<(usize, Bands)> =
-            self.strands.iter().filter_map(|strand| Some((strand.column?, self.factor(strand)))).collect();
+        // What is off or gone takes no rays: readings are those of a scene that never had it.
+        let shines = |(column, factor): &(usize, Bands)| *factor != [0.0; 3] && self.live.has_lamps(*column);
+        let columns = self.strands.iter().filter_map(|strand| Some((strand.column?, self.factor(strand))));
+        let columns: Vec<(usize, Bands)> = columns.filter(shines).collect();
         let shadows = (SHADOWS / columns.len().max(1) as u32).next_power_of_two().clamp(LEAST_SHADOWS, MOST_SHADOWS);
         Some(Meter { columns, target: Target { rays: RAYS, shadows } })
     }
@@ -143,7 +145,7 @@ impl Session {
     /// What was measured beside what is shown.
     fn compare(&self, survey: &Survey) -> Surveyed {
         let mut shown: BTreeMap<ObjectId, Vec<Bands>> = BTreeMap::new();
-        let (mut square, mut count) = (0f64, 0u32);
+        let (mut sum, mut squares, mut count) = (0f64, 0f64, 0u32);
         let mut read = |(place, halves): (&SurfacePlace, &Option<[Bands; 2]>)| {
             let (halves, (position, normal)) = ((*halves)?, self.place_of(place)?);
             let irradiance: Bands = std::array::from_fn(|band| 0.5 * (halves[0][band] + halves[1][band]));
@@ -154,14 +156,18 @@ impl Session {
             if a > 0.0 || b > 0.0 || shown > 0.0 {
                 // Each half is off by its own noise: in the mean their product has none.
                 let [a, b] = [a, b].map(|half| f64::from((shown - half) / most).clamp(-1.0, 1.0));
-                square += a * b;
+                sum += a * b;
+                squares += (a * b).powi(2);
                 count += 1;
             }
             let (lux, error) = (luminance(irradiance), 0.5 * (a - b).abs());
             Some(Reading { position: position.to_array(), normal: normal.to_array(), irradiance, lux, error, shown })
         };
         let readings: Vec<_> = survey.places.iter().zip(&survey.halves).map(&mut read).collect();
-        Surveyed { readings, off: (count > 0).then(|| (square / f64::from(count)).max(0.0).sqrt()) }
+        // What few places cannot tell from nothing is told as what it may be.
+        let n = f64::from(count.max(1));
+        let (mean, spread) = (sum / n, (squares / n - (sum / n).powi(2)).max(0.0));
+        Surveyed { readings, off: (count > 0).then(|| mean.max((spread / n).sqrt()).sqrt()) }
     }
 
     /// Places on surfaces that are seen from somewhere, evenly over the picture. The matrix is the world from the camera, by columns,

@@ -246,6 +246,11 @@ impl Live {
         added
     }
 
+    /// Whether a column has lamps.
+    pub fn has_lamps(&self, column: usize) -> bool {
+        !self.columns[column].is_empty()
+    }
+
     /// Adds a column for some lamps; `key` fixes its random choices. Answers its number.
     pub fn add_column(&mut self, key: u32, lamps: &[Lamp]) -> usize {
         self.columns.push(Column::new(&self.world, key, lamps));

@@ -12,7 +12,7 @@ use radiosity::{Bands, luminance};
 const MOST_SOURCES: usize = 6;
 const LEAST_SHARE: f32 = 1e-3;
 
-/// A remainder below this is that of small sources.
+/// Reflected light of less than this is not missed where the rest is known.
 const LEAST_TOLD: f32 = 0.02;
 
 impl Solver {
@@ -52,9 +52,8 @@ impl Solver {
     pub(super) fn post_model(&mut self) {
         let known = self.model.objects.len();
         let (objects, lights) = self.session.update_model(&mut self.model);
-        let added = self.model.objects[known..].iter();
-        self.changed.extend(added.clone().map(|object| object.id));
-        added.for_each(|object| self.post_mesh(object));
+        self.model.objects[known..].iter().for_each(|object| self.post_mesh(object));
+        self.back.extend(&objects);
         objects.into_iter().for_each(|id| self.post_object(&self.model.objects[id.0 as usize]));
         lights.into_iter().for_each(|id| self.post_lamp(&self.model.lights[id.0 as usize]));
     }
@@ -123,14 +122,15 @@ impl Solver {
     }
 
     /// A probe as people read it.
-    pub(super) fn read(&self, probe: &Probe, here: Option<Reading>) -> ProbeAnswer {
+    pub(super) fn read(&self, probe: &Probe, here: Reading) -> ProbeAnswer {
         let share = |bands: Bands| if probe.lux > 0.0 { luminance(bands) / probe.lux } else { 0.0 };
         let light = |id: radiosity::session::LightId| {
             let found = self.model.lights.iter().find(|light| light.id == id);
-            found.map_or_else(String::new, |light| match (light.name.as_str(), light.kind) {
-                (_, LightKind::Sky) => "Sky".to_owned(),
-                ("", _) => format!("light {}", id.0 + 1),
-                (name, _) => name.to_owned(),
+            found.map_or_else(String::new, |light| match (light.name.as_str(), light.kind, light.sharing) {
+                (.., sharing) if sharing > 1 => format!("{sharing} lights together"),
+                (_, LightKind::Sky, _) => "Sky".to_owned(),
+                ("", ..) => format!("light {}", id.0 + 1),
+                (name, ..) => name.to_owned(),
             })
         };
         let object = |id: ObjectId| {
@@ -140,22 +140,23 @@ impl Solver {
         let lights = probe.lights.iter().map(|(id, bands)| (light(*id), share(*bands)));
         let straight = ("straight from lights".to_owned(), share(probe.direct));
         let surfaces = probe.objects.iter().map(|(id, bands)| (object(*id), share(*bands)));
-        let mut lights = shares(lights);
         // Reflections are sorted by light only when all else is done.
-        let rest = 1.0 - lights.iter().map(|known| known.share).sum::<f32>();
+        let rest = 1.0 - lights.clone().map(|(_, share)| share).sum::<f32>();
+        let mut lights = shares("other lights", lights);
         if !lights.is_empty() && rest > LEAST_TOLD {
             lights.push(Share { name: "not told apart yet".to_owned(), share: rest });
         }
         // Shares are those of the element; how much it is, is measured at the place itself.
-        let irradiance = here.map_or(probe.irradiance, |here| here.irradiance);
+        let irradiance = here.irradiance;
         let more = |band: usize| probe.reflectance[band] * (irradiance[band] - probe.irradiance[band]);
         ProbeAnswer {
-            illuminance: luminance(irradiance),
+            illuminance: here.lux,
+            error: here.error,
             irradiance,
             reflectance: probe.reflectance,
             radiosity: std::array::from_fn(|band| (probe.radiosity[band] + more(band)).max(0.0)),
             lights,
-            surfaces: shares(std::iter::once(straight).chain(surfaces)),
+            surfaces: shares("other surfaces", std::iter::once(straight).chain(surfaces)),
         }
     }
 
@@ -191,8 +192,8 @@ impl Solver {
     }
 }
 
-/// The largest shares; primitives of one name are one thing to people.
-fn shares(named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
+/// The largest shares, and what those left out bring together; primitives of one name are one thing to people.
+fn shares(others: &str, named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     for (name, share) in named {
         match shares.iter_mut().find(|known| known.name == name) {
@@ -202,6 +203,24 @@ fn shares(named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
     }
     shares.retain(|known| known.share >= LEAST_SHARE);
     shares.sort_by(|a, b| b.share.total_cmp(&a.share));
-    shares.truncate(MOST_SOURCES);
+    let rest: f32 = shares.drain(MOST_SOURCES.min(shares.len())..).map(|left_out| left_out.share).sum();
+    if rest >= LEAST_SHARE {
+        shares.push(Share { name: others.to_owned(), share: rest });
+    }
     shares
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_named_is_told_together() {
+        let lamps = (0..13).map(|k| (format!("lamp {}", k % 12), 0.076));
+        let told = shares("other lights", lamps);
+        assert_eq!(told.len(), MOST_SOURCES + 1);
+        assert_eq!((told[0].name.as_str(), told[MOST_SOURCES].name.as_str()), ("lamp 0", "other lights"));
+        let sum: f32 = told.iter().map(|told| told.share).sum();
+        assert!((told[0].share - 0.152).abs() < 1e-6 && (sum - 13.0 * 0.076).abs() < 1e-5);
+    }
 }

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 /// Slack for cosines of angles: that of ray directions in single precision.
 const ROUNDING: f64 = 1e-6;
 
-/// A change of an object or of columns.
+/// A change of an object.
 #[derive(Clone, Debug)]
 pub struct Change {
     /// The object.
@@ -17,7 +17,7 @@ pub struct Change {
     pub before: Option<Bounds>,
 }
 
-/// An object that has changed: ids, whether it is there, and the balls and boxes where it was and is.
+/// An object that has changed, and where it is now, if it is there.
 pub struct Dirty<'a> {
     pub body: usize,
     pub own: &'a Body,
