@@ -173,9 +173,9 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
       return;
     }
     // What is held adds, copies and saves once; it moves, tunes and undoes on.
-    const goesOn = (event.ctrlKey || event.metaKey ? ['z', 'y'] : STEADY).includes(key) || held.has(key);
+    const goesOn = event.ctrlKey || event.metaKey ? key === 'z' || key === 'y' : held.has(key) || STEADY.includes(key);
     if (event.repeat && !goesOn && !isField) {
-      if (acts[key]) event.preventDefault();
+      if (event.ctrlKey || event.metaKey ? key === 'd' : acts[key]) event.preventDefault();
       return;
     }
     if (event.ctrlKey || event.metaKey) {

@@ -147,7 +147,7 @@ test('points of a grid beneath things are left out and counted', async () => {
     const { app } = window.radiosity;
     const { x, z } = app.measuring.probed.hit.point;
     const shift = [x - 0.186, z - 0.169];
-    app.editAll([...app.objects.values()].filter(({ name }) => name === 'short block')
+    app.editAll([...app.objects.values()].filter(({ name, deleted }) => name === 'short block' && !deleted)
       .map(({ id }) => ({ move: { object: id, matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, shift[0], 0, shift[1], 1] } })));
     return shift;
   });
