@@ -198,9 +198,11 @@ fn malformed_messages_are_refused_and_the_next_is_heard() {
         assert_eq!(refused["code"], code, "{refused}");
         assert!(!refused["message"].as_str().unwrap().is_empty());
     }
-    // Longer than any message may be: this connection ends, others do not notice.
+    // Longer than a message may be is told; far longer ends the connection unread, and others do not notice.
+    socket.say(&"x".repeat(3 << 19));
+    assert_eq!(socket.hear_of("refused")["code"], "message");
     let mut other = served.socket();
-    socket.say(&"x".repeat(2 << 20));
+    socket.say(&"x".repeat(3 << 20));
     while socket.hear().is_some() {}
     other.say(r#"{"kind":"layer","layer":"total","epoch":1}"#);
     other.hear_of("caught_up");
