@@ -96,7 +96,7 @@ struct Asked {
 /// What is measured.
 enum Measured {
     /// A picked place, where light comes from, too.
-    Place(SurfacePlace, Survey),
+    Place(SurfacePlace),
     Plane(Box<Plane>),
     /// A grid over a surface.
     Places(Survey),
@@ -108,7 +108,7 @@ impl Measured {
     /// A page picks one place, has one grid or plane, and looks from one place. What is least work comes first.
     fn kind(&self) -> u8 {
         match self {
-            Measured::Place(..) => 0,
+            Measured::Place(_) => 0,
             Measured::Plane(_) | Measured::Places(_) => 1,
             Measured::Sight(_) => 2,
         }
@@ -255,7 +255,7 @@ impl Solver {
             }
             Command::Ask { page, request: Request::Probe { question, object, triangle, uv }, answer } => {
                 let place = SurfacePlace { object, triangle, uv };
-                let what = Measured::Place(place, Survey::new(vec![place]));
+                let what = Measured::Place(place);
                 self.ask(Asked { page, question, what, answer });
             }
             Command::Ask { page, request: Request::Survey { question, object, places }, answer } => {
@@ -440,11 +440,10 @@ impl Solver {
             let left = until.saturating_duration_since(Instant::now());
             let question = self.measured[next].question;
             let text = match &mut self.measured[next].what {
-                Measured::Place(place, survey) => {
-                    let (place, surveyed) = (*place, self.session.survey(survey, left));
-                    surveyed.map(|surveyed| {
-                        let probe = self.session.probe(place.object, place.triangle, place.uv);
-                        let answer = probe.zip(surveyed.readings[0]).map(|(probe, here)| self.read(&probe, here));
+                Measured::Place(place) => {
+                    let probe = self.session.measures().then(|| self.session.probe(place));
+                    probe.map(|probe| {
+                        let answer = probe.map(|probe| self.read(&probe));
                         Say::Probe { question, answer }.text()
                     })
                 }

@@ -41,6 +41,7 @@ mod light;
 mod model;
 mod movable;
 mod paint;
+mod place;
 mod plane;
 mod probe;
 mod rectangle;

@@ -181,7 +181,7 @@ pub struct Probe {
     pub direct: Bands,
     /// One standard error of the illuminance by the rays of this place, lx.
     pub error: f32,
-    /// What each light brings, reflected light too, brightest first; before columns are solved, direct light only.
+    /// What each light brings, reflected light too, brightest first; before lights are told apart, unreflected light only.
     pub lights: Vec<(LightId, Bands)>,
     /// What objects send here of what they reflect, brightest first.
     pub objects: Vec<(ObjectId, Bands)>,

@@ -1,9 +1,9 @@
-//! What is read from a session: the model, layers of light, a place on a surface, its rays.
+//! What is read from a session: the model, layers of light, the rays of an element.
 
 use super::display::Weights;
-use super::model::{LightKind, Probe};
+use super::model::LightKind;
 use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session, display};
-use radiosity_scene::{Bands, PointLightKind, Projection, Side, luminance};
+use radiosity_scene::{Bands, PointLightKind, Projection, luminance};
 use radiosity_transport::live::{Chunk, Lanes};
 use std::sync::Arc;
 
@@ -371,89 +371,6 @@ impl Session {
     /// One standard error of the light of each element, with its sign.
     fn errors(&self) -> Vec<Lanes<4>> {
         if self.state.errors.is_empty() { self.find_errors() } else { self.state.errors.clone() }
-    }
-
-    /// What is known of a place on an object: `triangle` counts the object's [`ModelObject::indices`] by threes, `uv` are
-    /// the weights of its corners 1 and 2.
-    pub fn probe(&self, object: ObjectId, triangle: u32, uv: [f32; 2]) -> Option<Probe> {
-        let (chunk, element) = self.element(object, triangle)?;
-        let world = self.live.world();
-        let (body, placed) = (&world.bodies[object.0 as usize], &self.objects[object.0 as usize]);
-        if !body.is_present {
-            return None;
-        }
-        let id = (body.first + triangle) as usize;
-        let (t, side, at) = body.point(triangle, uv);
-        let position = at + world.middle;
-        let normal = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
-
-        let of = |list: &[Lanes<4>]| list.get(id).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]]);
-        let irradiance = of(&self.state.shown);
-        let (reflectance, _) = placed.paint.of(triangle, body.shape.fronts, placed.coat);
-        let factor = placed.light.map_or([0.0; 3], |light| self.lights[light].factor());
-        let exitance = body.shape.exitance.get(t).copied().unwrap_or_default();
-        let passed = self.answer.passed.iter().find(|(side, ..)| *side as usize == id);
-        let behind = passed.map_or([0.0; 3], |(_, other, tau)| {
-            let h = self.state.shown.get(*other as usize).copied().unwrap_or_default();
-            std::array::from_fn(|band| tau[band] * h.0[band])
-        });
-        let radiosity = std::array::from_fn(|band| {
-            exitance[band] * factor[band] + reflectance[band] * irradiance[band] + behind[band]
-        });
-
-        // What each object sends here along the rays of the row.
-        let rays = self.state.solved_rays as usize;
-        let mut objects: std::collections::BTreeMap<usize, Bands> = std::collections::BTreeMap::new();
-        let (mut unreflected, mut error) = (of(&self.state.direct), [0f32; 2]);
-        if rays > 0 && self.state.given.len() == self.live.ids() && !self.state.is_edited {
-            let (row, share) = chunk.row(element, rays);
-            let rays = row[0].len() + row[1].len();
-            let emission = self.emission();
-            for (m, other) in row.into_iter().flatten().enumerate() {
-                let given = self.state.given[*other as usize].0;
-                let emitted = emission[*other as usize].0;
-                error[usize::from(2 * m >= rays)] += share * luminance([given[0], given[1], given[2]]);
-                (0..3).for_each(|band| unreflected[band] += share * emitted[band]);
-                if let Some(body) = world.body_of_id(*other) {
-                    let sum = objects.entry(body).or_default();
-                    (0..3).for_each(|band| sum[band] += share * (given[band] - emitted[band]));
-                }
-            }
-        }
-        let brightest = |list: &mut Vec<(u32, Bands)>| {
-            list.retain(|(_, light)| luminance(*light) > 0.0);
-            list.sort_by(|a, b| luminance(b.1).total_cmp(&luminance(a.1)).then(a.0.cmp(&b.0)));
-        };
-        let mut objects: Vec<(u32, Bands)> = objects.into_iter().map(|(body, light)| (body as u32, light)).collect();
-        brightest(&mut objects);
-        let mut lights: Vec<(u32, Bands)> = Vec::new();
-        // Lamps that are not seen yet bring nothing to what is shown.
-        for (number, (strand, factor)) in self.strands.iter().zip(&self.state.factors).enumerate() {
-            let column = self.state.columns.get(number).and_then(|column| column.get(id));
-            let own = match (column, strand.column) {
-                (Some(own), _) if self.state.has_columns => *own,
-                (_, Some(column)) if !self.state.is_edited => chunk.light(column, element),
-                _ => continue,
-            };
-            if let Some(light) = strand.lights.first() {
-                lights.push((*light as u32, std::array::from_fn(|band| own[band] * factor[band])));
-            }
-        }
-        brightest(&mut lights);
-        Some(Probe {
-            object,
-            triangle: (body.shape.triangles.start + t) as u32,
-            position: position.to_array(),
-            normal: normal.to_array(),
-            lux: luminance(irradiance),
-            irradiance,
-            reflectance,
-            radiosity,
-            direct: unreflected,
-            error: (error[0] - error[1]).abs(),
-            lights: lights.into_iter().map(|(light, bands)| (LightId(light), bands)).collect(),
-            objects: objects.into_iter().map(|(object, bands)| (ObjectId(object), bands)).collect(),
-        })
     }
 
     /// The rays of the element that is such a triangle: origin and end, or a point as far as the scene is wide for

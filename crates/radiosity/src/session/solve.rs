@@ -40,6 +40,20 @@ impl Answer {
             .fold(0.0, f64::max);
     }
 
+    /// What comes through the sheet whose side has an id, given the irradiance of ids.
+    pub fn through(&self, id: u32, h: impl Fn(u32) -> [f32; 3]) -> [f32; 3] {
+        let Ok(place) = self.passed.binary_search_by_key(&id, |side| side.0) else { return [0.0; 3] };
+        let (_, other, tau) = self.passed[place];
+        let h = h(other);
+        std::array::from_fn(|band| tau[band] * h[band])
+    }
+
+    /// What an id makes of light, R H, given the irradiance of ids.
+    pub fn answer(&self, id: u32, h: impl Fn(u32) -> [f32; 3]) -> [f32; 3] {
+        let (own, through) = (h(id), self.through(id, &h));
+        std::array::from_fn(|band| self.rho[id as usize][band] * own[band] + through[band])
+    }
+
     /// Y = R H.
     pub fn reflect<const W: usize>(&self, h: &[Lanes<W>], y: &mut [Lanes<W>]) {
         let lanes = y.par_iter_mut().zip(h).zip(&self.rho).with_min_len(4096);

@@ -83,11 +83,16 @@ impl Survey {
 
 /// What points are measured with.
 pub(super) struct Meter {
-    columns: Vec<(usize, Bands)>,
-    target: Target,
+    pub columns: Vec<(usize, Bands)>,
+    pub target: Target,
 }
 
 impl Session {
+    /// Whether points can be measured: not before there is light, nor while an edit is not seen.
+    pub fn measures(&self) -> bool {
+        self.meter().is_some()
+    }
+
     /// What points are measured with; none while there is no light, or an edit is not seen.
     pub(super) fn meter(&self) -> Option<Meter> {
         let state = &self.state;

@@ -3,10 +3,44 @@
 
 use super::body::Site;
 use super::chunk::{ROWS, Target, shoot};
-use super::{Lanes, Live};
+use super::{Column, Lanes, Live};
 use glam::DVec3;
 use radiosity_scene::Bands;
 use radiosity_trace::sampling::{Sequence, frame, hash};
+
+/// What arrives at a point.
+#[derive(Clone, Debug)]
+pub struct Arrival {
+    /// What each ray finds, by id.
+    pub found: Vec<u32>,
+    /// What each column brings directly, lux per band: by the first half of its rays and by the second.
+    pub direct: Vec<[[f64; 3]; 2]>,
+}
+
+impl Arrival {
+    /// What each ray counts, the mean of both halves being the light: [`Live::receive`].
+    pub fn shares(&self) -> impl Iterator<Item = (u32, f64)> {
+        let halves = shares(self.found.len() as u32);
+        let half = self.found.len().div_ceil(2);
+        self.found.iter().enumerate().map(move |(m, id)| (*id, 0.5 * halves[usize::from(m >= half)]))
+    }
+
+    /// Irradiance by the halves of its rays. `given` is what surfaces give off, by id; columns are multiplied by `factors`.
+    pub fn halves(&self, given: &[Lanes<4>], factors: impl Iterator<Item = Bands>) -> [Bands; 2] {
+        let mut halves = [[0f64; 3]; 2];
+        let first = self.found.len().div_ceil(2);
+        for (m, (id, share)) in self.shares().enumerate() {
+            let (half, given) = (usize::from(m >= first), given[id as usize].0);
+            (0..3).for_each(|band| halves[half][band] += 2.0 * share * f64::from(given[band]));
+        }
+        for (direct, factor) in self.direct.iter().zip(factors) {
+            for (half, direct) in halves.iter_mut().zip(direct) {
+                (0..3).for_each(|band| half[band] += direct[band] * f64::from(factor[band]));
+            }
+        }
+        halves.map(|half| half.map(|x| x as f32))
+    }
+}
 
 impl Live {
     /// Irradiance at a point of the world with a unit normal, lux per band: once by the first half of its rays and once by the
@@ -14,12 +48,23 @@ impl Live {
     /// other. `given` is what surfaces give off, by id; columns are multiplied and added up.
     pub fn receive(
         &self,
-        (point, normal): (DVec3, DVec3),
+        place: (DVec3, DVec3),
         given: &[Lanes<4>],
         columns: &[(usize, Bands)],
         target: Target,
     ) -> [Bands; 2] {
         assert_eq!(given.len(), self.ids());
+        let arrival = self.arrive(place, columns.iter().map(|(column, _)| *column), target);
+        arrival.halves(given, columns.iter().map(|(_, factor)| *factor))
+    }
+
+    /// What arrives at a point of the world with a unit normal, straight from the lamps of some columns and from what its rays find.
+    pub fn arrive(
+        &self,
+        (point, normal): (DVec3, DVec3),
+        columns: impl Iterator<Item = usize>,
+        target: Target,
+    ) -> Arrival {
         assert!(target.rays >= 2 && target.shadows >= 2, "each half has rays: {target:?}");
         let world = &self.world;
         let site = Site::in_the_air(point - world.middle, normal);
@@ -28,39 +73,40 @@ impl Live {
             let bits = x.to_bits();
             hash(seed ^ bits as u32 ^ (bits >> 32) as u32)
         });
-        let mut halves = [[0f64; 3]; 2];
         let (sequence, frame) = (Sequence::new(seed, ROWS), frame(normal));
-        let shares = shares(target.rays);
-        for m in 0..target.rays {
+        let look = |m| {
             let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
-            let found = given[world.id(world.first(&ray, salt), direction) as usize].0;
-            let half = usize::from(2 * m >= target.rays);
-            (0..3).for_each(|band| halves[half][band] += shares[half] * f64::from(found[band]));
+            world.id(world.first(&ray, salt), direction)
+        };
+        let found = (0..target.rays).map(look).collect();
+        let direct = columns.map(|column| self.direct(&self.columns[column], &site, seed, target.shadows));
+        Arrival { found, direct: direct.collect() }
+    }
+
+    /// What a column brings straight to a place, by the halves of its rays.
+    fn direct(&self, column: &Column, site: &Site, seed: u32, rays: u32) -> [[f64; 3]; 2] {
+        let mut halves = [[0f64; 3]; 2];
+        if column.is_empty() {
+            return halves;
         }
-        for (column, factor) in columns {
-            let column = &self.columns[*column];
-            if column.is_empty() {
+        let world = &self.world;
+        let sequence = column.sequence(seed);
+        // Each ray to one light without area is the same.
+        let rays = if column.is_certain() { 1 } else { rays };
+        let shares = shares(rays);
+        for index in 0..rays {
+            let Some(sample) = column.sample(world, site, (seed, &sequence), index) else { continue };
+            if world.blocked(&sample.ray, sample.salt) {
                 continue;
             }
-            let sequence = column.sequence(seed);
-            // Each ray to one light without area is the same.
-            let rays = if column.is_certain() { 1 } else { target.shadows };
-            let shares = self::shares(rays);
-            for index in 0..rays {
-                let Some(sample) = column.sample(world, &site, (seed, &sequence), index) else { continue };
-                if world.blocked(&sample.ray, sample.salt) {
-                    continue;
-                }
-                let brings = |band: usize| sample.light[band] * f64::from(factor[band]);
-                if rays == 1 {
-                    halves.iter_mut().for_each(|half| (0..3).for_each(|band| half[band] += brings(band)));
-                } else {
-                    let half = usize::from(2 * index >= rays);
-                    (0..3).for_each(|band| halves[half][band] += shares[half] * brings(band));
-                }
+            if rays == 1 {
+                halves.iter_mut().for_each(|half| (0..3).for_each(|band| half[band] += sample.light[band]));
+            } else {
+                let half = usize::from(2 * index >= rays);
+                (0..3).for_each(|band| halves[half][band] += shares[half] * sample.light[band]);
             }
         }
-        halves.map(|half| half.map(|x| x as f32))
+        halves
     }
 }
 

@@ -37,6 +37,7 @@ mod gather;
 mod strata;
 mod world;
 
+pub use air::Arrival;
 pub use body::{Body, Bounds, Shape, Site};
 pub use chunk::{Chunk, NEAR_RAYS, Part, Target};
 pub use column::{Column, Lamp};

@@ -122,7 +122,7 @@ impl Solver {
     }
 
     /// A probe as people read it.
-    pub(super) fn read(&self, probe: &Probe, here: Reading) -> ProbeAnswer {
+    pub(super) fn read(&self, probe: &Probe) -> ProbeAnswer {
         let share = |bands: Bands| if probe.lux > 0.0 { luminance(bands) / probe.lux } else { 0.0 };
         let light = |id: radiosity::session::LightId| {
             let found = self.model.lights.iter().find(|light| light.id == id);
@@ -146,15 +146,12 @@ impl Solver {
         if !lights.is_empty() && rest > LEAST_TOLD {
             lights.push(Share { name: "not told apart yet".to_owned(), share: rest });
         }
-        // Shares are those of the element; how much it is, is measured at the place itself.
-        let irradiance = here.irradiance;
-        let more = |band: usize| probe.reflectance[band] * (irradiance[band] - probe.irradiance[band]);
         ProbeAnswer {
-            illuminance: here.lux,
-            error: here.error,
-            irradiance,
+            illuminance: probe.lux,
+            error: probe.error,
+            irradiance: probe.irradiance,
             reflectance: probe.reflectance,
-            radiosity: std::array::from_fn(|band| (probe.radiosity[band] + more(band)).max(0.0)),
+            radiosity: probe.radiosity,
             lights,
             surfaces: shares("other surfaces", std::iter::once(straight).chain(surfaces)),
         }
