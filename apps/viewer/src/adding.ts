@@ -72,9 +72,11 @@ export class Adding {
 
   /** Adds a lamp where it is seen. */
   addLamp(kind = this.lampKind): void {
-    const { stage, navigator, objects } = this.app;
+    const { stage, navigator, objects, lights } = this.app;
     if (kind === 'panel') {
-      this.addObjects(panelAhead(stage, navigator.scale, this.newName('Panel'), (id) => objects.get(id)?.form !== null));
+      const shining = new Set([...lights.values()].map(({ object }) => object));
+      const isLampOrAdded = (id: number) => shining.has(id) || objects.get(id)?.form !== null;
+      this.addObjects(panelAhead(stage, navigator.scale, this.newName('Panel'), isLampOrAdded));
       return;
     }
     const light = lampAhead(stage, navigator.scale, kind, this.newName('Lamp'));

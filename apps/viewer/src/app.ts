@@ -89,6 +89,7 @@ export class App {
     this.connection = new Connection({
       notice: (notice) => this.notice(notice),
       mesh: (frame) => this.mesh(frame),
+      cuts: (frame) => this.stage.cut(frame),
       light: (frame) => this.shine(frame),
       connected: (is) => this.connected(is),
     });
@@ -627,7 +628,7 @@ export class App {
     this.layer = layer;
     this.resting = '';
     // Light of the last layer would be taken for that of this one.
-    for (const surface of this.stage.surfaces.values()) this.stage.shine(surface, 0, new Uint16Array(surface.light.array.length));
+    for (const surface of this.stage.surfaces.values()) this.stage.darken(surface);
     shared.emissionShown.value = layer === 'total' || layer === 'direct' ? 1 : 0;
     this.connection.look(layer);
     this.exposure.free();

@@ -1,6 +1,7 @@
 // Surfaces are drawn together: those with the same picture are ranges of one large mesh, and one call draws all of it that
 // is in sight. What differs between them, place, tint and emission, lies in tables that the vertex shader reads.
 import { BatchedMesh, type BufferAttribute, DataTexture, Float16BufferAttribute, FloatType, FrontSide, GLSL3, type Group, RGBAFormat, ShaderMaterial, type Texture } from 'three';
+import { Cuts } from './cuts';
 import { FRAGMENT, shared, type Surface, VERTEX } from './surface';
 
 /** Texels of the table for each surface: tint, emission, transmittance. */
@@ -16,13 +17,17 @@ class Batch {
   private instances = new Map<Surface, { instance: number; geometry: number }>();
   private hasHoles = false;
 
-  constructor(private root: Group, map: Texture | null, private isOfSheets: boolean) {
+  constructor(private root: Group, map: Texture | null, private isOfSheets: boolean, isOfParts: boolean) {
     const defines = { ...(map ? { TEXTURED: '' } : {}), ...(isOfSheets ? { SHEET: '' } : {}) };
     this.material = new ShaderMaterial({
       glslVersion: GLSL3,
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       side: FrontSide,
+      // Parts lie where the whole is.
+      polygonOffset: isOfParts,
+      polygonOffsetFactor: -0.5,
+      polygonOffsetUnits: -4,
       defines,
       uniforms: { ...shared, map: { value: map }, looks: { value: this.looks } },
     });
@@ -112,8 +117,8 @@ class Batch {
 }
 
 /** What surfaces have in common that are drawn together. */
-function keyOf({ look, isSheet }: Surface): string {
-  return `${look.texture?.uuid ?? ''} ${isSheet}`;
+function keyOf(surface: Surface): string {
+  return `${surface.look.texture?.uuid ?? ''} ${surface.isSheet} ${surface instanceof Cuts}`;
 }
 
 /** All surfaces, by what they have to share to be drawn together. */
@@ -158,7 +163,7 @@ export class Batches {
       const key = keyOf(surface);
       let batch = this.batches.get(key);
       if (!batch) {
-        batch = new Batch(this.root, surface.look.texture, surface.isSheet);
+        batch = new Batch(this.root, surface.look.texture, surface.isSheet, surface instanceof Cuts);
         this.batches.set(key, batch);
       }
       if (!together.has(batch)) together.set(batch, []);

@@ -25,6 +25,9 @@ const WHITE = 0.8;
 /** Where panels go when there is one already, in steps of half as much again as its side. */
 const BESIDE = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1], [2, 0], [-2, 0], [0, 2], [0, -2]];
 
+/** Where what is above a panel is looked at, over its side. */
+const ACROSS = [-0.5, -0.25, 0, 0.25, 0.5];
+
 const UP = new Vector3(0, 1, 0);
 
 /** Something that was added, as far as its place and form matter. */
@@ -55,12 +58,12 @@ export function boxAhead(stage: Stage, metre: number, name: string): NewObject {
   return { name, form: { box: { size: [side, side, side] } }, reflectance: [GREY, GREY, GREY], matrix: standing(stage, place, false).toArray() };
 }
 
-/** A panel that shines down from the ceiling above what one looks at, clear of walls and of other things that were added: what
- *  shines, and its housing. */
-export function panelAhead(stage: Stage, metre: number, name: string, isAdded: (object: number) => boolean): NewObject[] {
+/** A panel that shines down from the ceiling above what one looks at, clear of walls, of lamps and of other things that were
+ *  added: what shines, and its housing. */
+export function panelAhead(stage: Stage, metre: number, name: string, isLampOrAdded: (object: number) => boolean): NewObject[] {
   const side = Math.max(PANEL * metre, LEAST * stage.bounds.getSize(new Vector3()).length());
   const scale = side / PANEL;
-  const place = onCeiling(stage, side, scale, isAdded) ?? hung(stage, metre, inSight(stage, metre));
+  const place = onCeiling(stage, side, scale, isLampOrAdded) ?? hung(stage, metre, inSight(stage, metre));
   const matrix = standing(stage, place, true);
   const shining = side - 2 * RIM * scale;
   const exitance = (FLUX * scale * scale) / shining ** 2;
@@ -71,7 +74,7 @@ export function panelAhead(stage: Stage, metre: number, name: string, isAdded: (
   ];
 }
 
-function onCeiling(stage: Stage, side: number, scale: number, isAdded: (object: number) => boolean): Vector3 | null {
+function onCeiling(stage: Stage, side: number, scale: number, isLampOrAdded: (object: number) => boolean): Vector3 | null {
   const hit = stage.pick(0, 0);
   const from = hit ? hit.point.clone().addScaledVector(hit.normal, BELOW * scale) : inSight(stage, scale);
   const first = stage.cast(from, UP, Infinity, DoubleSide);
@@ -83,9 +86,10 @@ function onCeiling(stage: Stage, side: number, scale: number, isAdded: (object: 
     if (way.length() > 0 && stage.cast(from, way.clone().normalize(), way.length() + 0.5 * side, DoubleSide)) continue;
     const at = clearOf(stage, from.clone().add(way), 0.6 * side, level);
     const above = (x: number, z: number) => stage.cast(at.clone().add(new Vector3(x * side, 0, z * side)), UP, Infinity, DoubleSide);
-    const ceiling = above(0, 0);
-    const isTaken = [ceiling, ...[-0.5, 0.5].flatMap((x) => [above(x, -0.5), above(x, 0.5)])].some((hit) => hit && isAdded(hit.surface.object));
-    if (ceiling && !isTaken) return at.setY(at.y + ceiling.distance - BELOW * scale);
+    const hits = ACROSS.flatMap((x) => ACROSS.map((z) => above(x, z))).filter((hit) => hit !== null);
+    const isTaken = hits.some((hit) => isLampOrAdded(hit.surface.object));
+    // As low as the lowest of what is above.
+    if (hits.length > 0 && !isTaken) return at.setY(at.y + Math.min(...hits.map(({ distance }) => distance)) - BELOW * scale);
   }
   return null;
 }

@@ -1,10 +1,9 @@
 // A measuring grid over a plane surface. Its cells are as EN 12464-1 asks: no longer than p = 0.2 · 5^lg d and 10 m, d the
 // longer side, or the shorter one where that is half of it or less. The number of cells is rounded up, so that they are
 // never larger. A grid stays where it was laid, goes with its surface, and is read again when light changes.
-import { DataUtils, DoubleSide, Ray, Vector3 } from 'three';
-import { luminance } from './luminance';
-import { barycentric, corners, type Hit } from './stage';
-import { UNIT, type Surface } from './surface';
+import { DoubleSide, Ray, Vector3 } from 'three';
+import { barycentric, corners, type Hit, type Stage } from './stage';
+import type { Surface } from './surface';
 import type { SurveyAnswer } from './wire';
 
 /** A point of a grid, and where on the surface it is: weights of the triangle's corners 1 and 2. */
@@ -148,18 +147,6 @@ export function lay({ surface, triangle, uv }: Hit): Grid | null {
   return grid;
 }
 
-/** Illuminance at a point of a triangle, in the light that is shown now, lx. */
-export function luxAt(surface: Surface, triangle: number, [v, w]: [number, number]): number {
-  const values = surface.light.array as Uint16Array;
-  const index = surface.geometry.index!;
-  const light = [0, 0, 0];
-  [1 - v - w, v, w].forEach((weight, k) => {
-    const at = 3 * index.getX(3 * triangle + k);
-    for (let band = 0; band < 3; band += 1) light[band] += weight * UNIT * DataUtils.fromHalfFloat(values[at + band]);
-  });
-  return luminance(light);
-}
-
 /** Puts the points of a grid where its surface is now; what comes back is where it was picked. */
 export function follow(grid: Grid): Vector3 {
   const { surface } = grid;
@@ -178,9 +165,9 @@ export function open({ points }: Grid): GridPoint[] {
 }
 
 /** Reads a grid: what was measured, or of a layer that is no whole light, and before anything is measured, what is shown. */
-export function read(grid: Grid, isWhole: boolean): void {
+export function read(grid: Grid, isWhole: boolean, stage: Stage): void {
   const lux = open(grid).map((point) => {
-    point.lux = (isWhole ? point.measured : null) ?? luxAt(grid.surface, point.triangle, point.uv);
+    point.lux = (isWhole ? point.measured : null) ?? stage.lux(grid.surface, point.triangle, point.uv);
     return point.lux;
   });
   grid.mean = lux.reduce((a, b) => a + b, 0) / Math.max(1, lux.length);

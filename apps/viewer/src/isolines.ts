@@ -2,7 +2,6 @@
 // where the logarithm says; rays from the eye find the place on the surface, as exactly as the line is drawn.
 import type { Vector3 } from 'three';
 import type { App } from './app';
-import { luxAt } from './grid';
 import { METER, type Stage } from './stage';
 
 /** Farther apart than this factor, two pixels are of different surfaces, or lines lie too close for numbers. */
@@ -48,7 +47,7 @@ function along(stage: Stage, level: number, [a, b]: number[], place: (t: number)
     const t = from.t + ((to.t - from.t) * from.log) / (from.log - to.log);
     const [x, y] = place(t);
     const hit = stage.pick(x, y);
-    const log = hit ? Math.log(luxAt(hit.surface, hit.triangle, hit.uv) / level) : NaN;
+    const log = hit ? Math.log(stage.lux(hit.surface, hit.triangle, hit.uv) / level) : NaN;
     if (hit && Math.abs(log) < NEAR) return hit.point;
     if (!Number.isFinite(log)) return null;
     if (log * from.log > 0) from = { t, log };

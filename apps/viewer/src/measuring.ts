@@ -202,7 +202,7 @@ export class Measuring {
       this.app.say('All points of the grid lie beneath things.');
       return this.clearGrid();
     }
-    if (this.grid) read(this.grid, this.app.layer === 'total');
+    if (this.grid) read(this.grid, this.app.layer === 'total', this.app.stage);
     this.app.marks.grid(this.grid);
     this.app.tell('grid');
   }

@@ -46,7 +46,7 @@ export class Sight {
       if (this.error !== null) this.put(null);
       return;
     }
-    const now = `${view} ${status.rays} ${status.edits} ${status.error}`;
+    const now = `${view} ${status.rays} ${status.edits} ${status.error} ${status.is_done}`;
     if (!isStill || now === this.asked) return;
     this.question += 1;
     if (connection.send({ kind: 'in_sight', question: this.question, matrix, fov, aspect })) this.asked = now;

@@ -5,9 +5,11 @@ import {
   WebGLRenderTarget,
 } from 'three';
 import { Batches } from './batch';
+import { Cuts } from './cuts';
+import { luminance } from './luminance';
 import { Outline } from './outline';
 import { DISPLAY, type Look, Mode, shared, type Surface } from './surface';
-import type { CameraPlace, SceneNotice } from './wire';
+import type { CameraPlace, CutsFrame, SceneNotice } from './wire';
 
 /** The colour of what is marked. */
 export const ACCENT = 0xe8b04a;
@@ -67,6 +69,9 @@ export class Stage {
   moves = 0;
   private dirty = true;
   private boxes = new Map<number, Box3>();
+  /** The elements that are cut, by object, and what light there is beyond the vertices. */
+  private cuts = new Map<number, Cuts>();
+  private beyond = new Map<number, Uint16Array>();
   private sky: Mesh<SphereGeometry, ShaderMaterial>;
   private meter = new WebGLRenderTarget(METER[0], METER[1], { type: FloatType, format: RGBAFormat });
   private isMetering = false;
@@ -172,6 +177,8 @@ export class Stage {
   remove(object: number): void {
     const old = this.surfaces.get(object);
     if (!old) return;
+    this.cut({ object, cuts: [] });
+    this.beyond.delete(object);
     this.root.remove(old);
     this.batches.remove(old);
     old.dispose();
@@ -184,14 +191,77 @@ export class Stage {
   dress(surface: Surface, look: Look): void {
     surface.look = look;
     this.batches.put(surface);
+    const cuts = this.cuts.get(surface.object);
+    if (cuts) {
+      cuts.look = look;
+      this.batches.put(cuts);
+    }
     this.change();
   }
 
-  /** Light has come to vertices of a surface. */
+  /** Light has come to vertices of a surface, and to places of its elements that are cut, which follow them. */
   shine(surface: Surface, first: number, values: Uint16Array): void {
-    (surface.light.array as Uint16Array).set(values, 3 * first);
-    this.batches.shine(surface, first, values.length / 3);
+    const own = values.subarray(0, Math.max(0, 3 * (surface.light.count - first)));
+    if (own.length > 0) {
+      (surface.light.array as Uint16Array).set(own, 3 * first);
+      this.batches.shine(surface, first, own.length / 3);
+    }
+    if (own.length < values.length) this.shineBeyond(surface, Math.max(0, first - surface.light.count), values.subarray(own.length));
     this.change();
+  }
+
+  /** None of its light is known. */
+  darken(surface: Surface): void {
+    const beyond = this.beyond.get(surface.object)?.length ?? 0;
+    this.shine(surface, 0, new Uint16Array(surface.light.array.length + beyond));
+  }
+
+  private shineBeyond({ object }: Surface, first: number, values: Uint16Array): void {
+    let beyond = this.beyond.get(object) ?? new Uint16Array(0);
+    if (beyond.length < 3 * first + values.length) {
+      const old = beyond;
+      beyond = new Uint16Array(3 * first + values.length);
+      beyond.set(old);
+      this.beyond.set(object, beyond);
+    }
+    beyond.set(values, 3 * first);
+    const cuts = this.cuts.get(object);
+    if (!cuts) return;
+    const count = Math.min(values.length / 3, cuts.light.count - first);
+    if (count <= 0) return;
+    (cuts.light.array as Uint16Array).set(values.subarray(0, 3 * count), 3 * first);
+    this.batches.shine(cuts, first, count);
+  }
+
+  /** Other elements of an object are cut than before. */
+  cut(frame: CutsFrame): void {
+    const old = this.cuts.get(frame.object);
+    if (old) {
+      this.batches.remove(old);
+      old.dispose();
+      this.cuts.delete(frame.object);
+    }
+    const surface = this.surfaces.get(frame.object);
+    if (surface && frame.cuts.length > 0) {
+      const cuts = new Cuts(surface, frame);
+      const light = cuts.light.array as Uint16Array;
+      light.set((this.beyond.get(frame.object) ?? new Uint16Array(0)).subarray(0, light.length));
+      this.cuts.set(frame.object, cuts);
+      this.batches.put(cuts);
+    }
+    this.change();
+  }
+
+  /** Irradiance at a point of a triangle as it is shown now, lux per band. */
+  light(surface: Surface, triangle: number, uv: [number, number]): number[] {
+    const cuts = this.cuts.get(surface.object);
+    const around = cuts?.around(triangle, uv);
+    return around ? cuts!.between(around) : surface.between(surface.around(triangle, uv)!);
+  }
+
+  /** Illuminance there, lx. */
+  lux(surface: Surface, triangle: number, uv: [number, number]): number {
+    return luminance(this.light(surface, triangle, uv));
   }
 
   /** A surface is elsewhere, or there no longer. */
@@ -199,6 +269,11 @@ export class Stage {
     this.moves += 1;
     surface.updateMatrixWorld(true);
     this.batches.place(surface);
+    const cuts = this.cuts.get(surface.object);
+    if (cuts) {
+      cuts.visible = surface.visible;
+      this.batches.place(cuts);
+    }
     surface.geometry.boundingBox ?? surface.geometry.computeBoundingBox();
     this.boxes.set(surface.object, surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld));
     this.change();

@@ -1,6 +1,6 @@
 // A surface as the eye sees it, or as a meter does: light at vertices times reflectance at pixels.
 import {
-  BufferAttribute, BufferGeometry, Float16BufferAttribute, FrontSide, Mesh, MeshBasicMaterial, type Texture, Vector2, Vector3,
+  BufferAttribute, BufferGeometry, DataUtils, Float16BufferAttribute, FrontSide, Mesh, MeshBasicMaterial, type Texture, Vector2, Vector3,
   type IUniform,
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
@@ -179,12 +179,12 @@ export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
   /** Its tree of boxes, once a ray needed it. */
   private boxes: MeshBVH | null = null;
 
-  constructor(readonly object: number, frame: MeshFrame) {
+  constructor(readonly object: number, frame: MeshFrame, outward = outwards(frame.positions, frame.indices)) {
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(frame.positions, 3));
     geometry.setAttribute('uv', new BufferAttribute(frame.uvs ?? new Float32Array((2 * frame.positions.length) / 3), 2));
     geometry.setAttribute('paint', new BufferAttribute(frame.colours ?? new Float32Array(frame.positions.length).fill(1), 3));
-    geometry.setAttribute('outward', new BufferAttribute(outwards(frame.positions, frame.indices), 3));
+    geometry.setAttribute('outward', new BufferAttribute(outward, 3));
     geometry.setIndex(new BufferAttribute(frame.indices, 1));
     const light = new Float16BufferAttribute(new Uint16Array(frame.positions.length), 3);
     geometry.setAttribute('light', light);
@@ -223,6 +223,22 @@ export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
   get tree(): MeshBVH {
     this.boxes ??= new MeshBVH(this.geometry, { indirect: true });
     return this.boxes;
+  }
+
+  /** The vertices around a place of a triangle, and their weights. */
+  around(triangle: number, [v, w]: [number, number]): [number, number][] | null {
+    const index = this.geometry.index!;
+    return [1 - v - w, v, w].map((weight, k) => [index.getX(3 * triangle + k), weight]);
+  }
+
+  /** Irradiance between vertices, lux per band. */
+  between(around: [number, number][]): number[] {
+    const values = this.light.array as Uint16Array;
+    const light = [0, 0, 0];
+    for (const [vertex, weight] of around) {
+      for (let band = 0; band < 3; band += 1) light[band] += weight * UNIT * DataUtils.fromHalfFloat(values[3 * vertex + band]);
+    }
+    return light;
   }
 
   dispose(): void {

@@ -1,7 +1,6 @@
 // What tests read from the page and do to it, as `window.radiosity`.
 import { DataUtils, Vector3 } from 'three';
 import type { App } from './app';
-import { luminance } from './luminance';
 import { corners, type Hit } from './stage';
 import { UNIT } from './surface';
 
@@ -12,9 +11,11 @@ export function tests(app: App) {
     const weights = [1 - uv[0] - uv[1], ...uv];
     return [0, 1, 2].map((band) => weights.reduce((sum, weight, k) => sum + weight * at(index.getX(3 * triangle + k), band), 0));
   };
-  const light = (hit: Hit, side = (vertex: number) => vertex) => {
-    const values = hit.surface.light.array as Uint16Array;
-    return interpolated(hit, (vertex, band) => UNIT * DataUtils.fromHalfFloat(values[3 * side(vertex) + band]));
+  const light = ({ surface, triangle, uv }: Hit) => app.stage.light(surface, triangle, uv);
+  const behind = (hit: Hit) => {
+    const { surface } = hit;
+    const values = surface.light.array as Uint16Array;
+    return surface.isSheet ? interpolated(hit, (vertex, band) => UNIT * DataUtils.fromHalfFloat(values[3 * surface.otherSide[vertex] + band])) : [0, 0, 0];
   };
   /** Illuminance at a point of a surface, lx. `normal` says on which side. */
   const lux = ([x, y, z, nx, ny, nz]: number[]): number | null => {
@@ -22,7 +23,7 @@ export function tests(app: App) {
     const normal = new Vector3(nx, ny, nz).transformDirection(app.stage.root.matrixWorld);
     const size = app.stage.bounds.getSize(new Vector3()).length();
     const hit = app.stage.cast(point.clone().addScaledVector(normal, 2e-4 * size), normal.clone().negate(), 1e-3 * size);
-    return hit && luminance(light(hit));
+    return hit && app.stage.lux(hit.surface, hit.triangle, hit.uv);
   };
   return {
     app,
@@ -52,7 +53,7 @@ export function tests(app: App) {
           name: app.objects.get(hit.surface.object)!.name,
           pixel: [...pixels.subarray(4 * (row * width + column), 4 * (row * width + column) + 3)],
           irradiance: light(hit),
-          behind: hit.surface.isSheet ? light(hit, (vertex) => hit.surface.otherSide[vertex]) : [0, 0, 0],
+          behind: behind(hit),
           reflectance: interpolated(hit, (vertex, band) => paint[3 * vertex + band] * tint[band]),
           transmittance, emission, hasPicture: texture !== null,
         };

@@ -256,7 +256,13 @@ export interface MeshFrame {
   indices: Uint32Array;
 }
 
-/** Light of some vertices, three half floats each in units of 16 lx. */
+/** Which elements of an object are cut, as light has an edge in them, and into how many parts along each side. */
+export interface CutsFrame {
+  object: number;
+  cuts: [number, number][];
+}
+
+/** Light of some vertices, three half floats each in units of 16 lx; the places of elements that are cut follow the vertices. */
 export interface LightFrame {
   object: number;
   first: number;
@@ -265,6 +271,7 @@ export interface LightFrame {
 
 const MESH = 1;
 const LIGHT = 2;
+const CUTS = 3;
 const HAS_UVS = 1;
 const HAS_COLOURS = 2;
 
@@ -282,6 +289,11 @@ function readMesh(buffer: ArrayBuffer): MeshFrame {
   return { object, positions, uvs, colours, indices: new Uint32Array(buffer, at, 3 * triangles) };
 }
 
+function readCuts(buffer: ArrayBuffer): CutsFrame {
+  const [, object, ...words] = new Uint32Array(buffer);
+  return { object, cuts: Array.from({ length: words.length / 2 }, (_, k) => [words[2 * k], words[2 * k + 1]]) };
+}
+
 function* readLight(buffer: ArrayBuffer): Generator<LightFrame> {
   const view = new DataView(buffer);
   let at = 8;
@@ -296,6 +308,7 @@ function* readLight(buffer: ArrayBuffer): Generator<LightFrame> {
 export interface Listener {
   notice(notice: Notice): void;
   mesh(frame: MeshFrame): void;
+  cuts(frame: CutsFrame): void;
   light(frame: LightFrame): void;
   connected(is: boolean): void;
 }
@@ -372,6 +385,7 @@ export class Connection {
     this.received += data.byteLength;
     const [kind, epoch] = new Uint32Array(data, 0, 2);
     if (kind === MESH) this.listener.mesh(readMesh(data));
+    if (kind === CUTS) this.listener.cuts(readCuts(data));
     // Light of a layer that was looked at before is still under way when another is chosen.
     if (kind === LIGHT && epoch === this.epoch) for (const frame of readLight(data)) this.listener.light(frame);
   }

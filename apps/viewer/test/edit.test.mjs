@@ -71,7 +71,7 @@ test('a thing is dragged, and light follows while it is and as a batch solve has
   await page.waitForFunction(([points, before]) => {
     const { radiosity } = window;
     return points.filter((point, i) => Math.abs((radiosity.lux(point) ?? 0) - before[i]) > 0.05 * before[i]).length > 3;
-  }, [before.points, before.lux], { timeout: 10_000 });
+  }, [before.points, before.lux], { timeout: 30_000 });
   assert.ok((await state(page)).isDragging, 'and still is');
   const held = (await named(page, 'short block')).matrix;
   await page.mouse.up();

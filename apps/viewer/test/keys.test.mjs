@@ -75,7 +75,7 @@ test('everything is reached by keyboard alone', async () => {
       break;
     }
   }
-  await page.waitForFunction(() => window.radiosity.state().lights[0].dimming === 0, undefined, { timeout: 5000 });
+  await page.waitForFunction(() => window.radiosity.state().lights[0].dimming === 0, undefined, { timeout: 20_000 });
   await page.keyboard.press('Escape');
   await page.keyboard.press('Control+z');
   await page.waitForFunction(() => window.radiosity.state().lights[0].dimming === 1);

@@ -517,7 +517,7 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   assert.ok(Math.abs(Math.max(...painted) - 0.99) < 1e-3 && most < 99, `${painted} ${most}`);
   assert.match((await state(page)).message, new RegExp(`${most.toFixed(0)} % is the most`));
   // It is gone when it was read.
-  await page.waitForFunction(() => window.radiosity.state().message === '', undefined, { timeout: 15_000 });
+  await page.waitForFunction(() => window.radiosity.state().message === '', undefined, { timeout: 30_000 });
   await restored(page);
   // Far away.
   const places = await page.evaluate(() => {

@@ -92,7 +92,7 @@ async function instead(route) {
 export const state = (page) => page.evaluate(() => window.radiosity.state());
 
 export async function caughtUp(page) {
-  await page.waitForFunction(() => window.radiosity?.state().isCaughtUp, undefined, { timeout: 20_000 });
+  await page.waitForFunction(() => window.radiosity?.state().isCaughtUp, undefined, { timeout: 60_000 });
 }
 
 /** A page whose connection ends, by what is done, and which finds none until `online`. */
@@ -120,7 +120,7 @@ export async function done(page, edits = 0) {
   await page.waitForFunction((edits) => {
     const { status } = window.radiosity.state();
     return status && status.is_done && status.edits >= edits;
-  }, edits, { timeout: 60_000 });
+  }, edits, { timeout: 180_000 });
   await quiet(page);
 }
 

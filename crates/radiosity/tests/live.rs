@@ -15,7 +15,7 @@ use room::{Furnishing, room};
 use std::time::Duration;
 
 fn small() -> SessionOptions {
-    SessionOptions { elements: 900, rays: 128, shadow_rays: Some(16), ..SessionOptions::default() }
+    SessionOptions { elements: 900, rays: 128, shadow_rays: Some(16), places: 4000, ..SessionOptions::default() }
 }
 
 fn furnished() -> Scene {
@@ -50,9 +50,12 @@ fn finish(session: &mut Session) {
 /// All light of a session, as bits.
 fn bits(session: &Session) -> Vec<u32> {
     let objects = session.model().objects.len() as u32;
-    let of =
-        |object| session.light(ObjectId(object), Layer::Total).into_iter().chain(session.irradiance(ObjectId(object)));
-    (0..objects).flat_map(of).flatten().map(f32::to_bits).collect()
+    let of = |object| {
+        let light = session.light(object, Layer::Total);
+        let cuts = session.light_of_cuts(object, Layer::Total, &light);
+        light.into_iter().chain(cuts).chain(session.irradiance(object))
+    };
+    (0..objects).map(ObjectId).flat_map(of).flatten().map(f32::to_bits).collect()
 }
 
 struct Dice(Random);

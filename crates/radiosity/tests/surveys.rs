@@ -4,7 +4,9 @@
 mod room;
 
 use glam::{DAffine3, DMat3, DMat4, DVec3};
-use radiosity::session::{Edit, NewLight, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed};
+use radiosity::session::{
+    Edit, Layer, LightId, NewLight, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed,
+};
 use radiosity::{Material, PointLight, PointLightKind, Scene};
 use room::{Furnishing, room};
 use std::time::Duration;
@@ -88,6 +90,57 @@ fn places_read_their_own_light() {
     assert_eq!(session.survey(&mut waiting, Duration::ZERO), None, "the edit is not seen");
     finish(&mut session);
     assert_eq!(session.survey(&mut waiting, Duration::ZERO).unwrap().readings, vec![None; 4]);
+}
+
+/// Edges of shadows are shown as wide as a part of an element; after an edit the picture is that of a session which began so.
+#[test]
+fn elements_are_cut_where_light_has_an_edge() {
+    let options = |places| SessionOptions { element_size: Some(0.5), rays: 64, places, ..SessionOptions::default() };
+    let mut session = Session::new(shaded(), &options(30_000)).unwrap();
+    finish(&mut session);
+    let floor = ObjectId(0);
+    let light = |session: &Session, layer| session.light_of_cuts(floor, layer, &session.light(floor, layer));
+    let cuts = session.cuts(floor);
+    let elements = session.irradiance(floor).len();
+    assert!(!cuts.is_empty() && cuts.len() < elements / 2, "{} of {elements} elements are cut", cuts.len());
+    assert_eq!(light(&session, Layer::Total), light(&session, Layer::Direct));
+    assert!(light(&session, Layer::Indirect).iter().all(|light| light[1].abs() < 1e-3));
+
+    let mut dice = radiosity_trace::sampling::Random::new(7);
+    let mut anywhere = || SurfacePlace {
+        object: floor,
+        triangle: (dice.next_unit() * elements as f64) as u32,
+        uv: [0.0, 1.0].map(|_| 0.5 * dice.next_unit() as f32),
+    };
+    let places: Vec<SurfacePlace> = (0..2000).map(|_| anywhere()).collect();
+    let off = |session: &Session| read(session, places.clone()).off.unwrap();
+    let mut whole = Session::new(shaded(), &options(0)).unwrap();
+    finish(&mut whole);
+    assert!(whole.cuts(floor).is_empty());
+    let (before, after) = (off(&whole), off(&session));
+    assert!(before > 0.1 && after < 0.3 * before, "{after} instead of {before}");
+
+    let matrix = glam::DMat4::from_translation(DVec3::new(-0.4, 0.1, 0.2)).to_cols_array();
+    let edit = Edit::Move { object: ObjectId(1), matrix };
+    session.apply(&edit).unwrap();
+    while !session.step(Duration::ZERO).is_complete {}
+    // Far from the shadow nothing changes; what is cut there stays so.
+    let kept = session.cuts(floor).len();
+    assert!((1..cuts.len()).contains(&kept), "{kept} of {}", cuts.len());
+    finish(&mut session);
+    let mut fresh = Session::new(shaded(), &options(30_000)).unwrap();
+    fresh.apply(&edit).unwrap();
+    finish(&mut fresh);
+    assert!(session.cuts(floor) == fresh.cuts(floor) && session.cuts(floor) != cuts);
+    assert_eq!(light(&session, Layer::Total), light(&fresh, Layer::Total));
+    // Half the light has half the edge.
+    session.apply(&Edit::Light { light: LightId(0), dimming: 0.5, colour: [1.0; 3] }).unwrap();
+    while !session.step(Duration::ZERO).is_complete {}
+    let halves = light(&session, Layer::Total);
+    assert!(!halves.is_empty());
+    for (half, whole) in halves.iter().zip(light(&fresh, Layer::Total)) {
+        assert!((half[1] - 0.5 * whole[1]).abs() <= 1e-4 * whole[1].max(1.0), "{half:?} of {whole:?}");
+    }
 }
 
 /// Where light is even, the picture is off by next to nothing though single readings are noisy; where nothing is seen there is

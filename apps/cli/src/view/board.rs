@@ -24,6 +24,8 @@ pub enum Subject {
     Scene,
     /// Triangles of an object.
     Mesh(u32),
+    /// Elements of an object that are cut.
+    Cuts(u32),
     /// An object: where it is, what it is made of.
     Object(u32),
     /// A light.

@@ -69,6 +69,10 @@ pub struct Arguments {
 /// Commands that wait for the solver.
 const WAITING: usize = 256;
 
+/// Most places at which light is found where it has an edge within elements: pages draw two triangles for each, and twelve bytes come
+/// with every change of it.
+const PLACES: usize = 250_000;
+
 /// How long open connections have to end.
 const FAREWELL: Duration = Duration::from_millis(500);
 
@@ -95,6 +99,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         element_size: arguments.element_size,
         elements: arguments.elements,
         rays: arguments.rays,
+        places: PLACES,
         memory: arguments.memory,
         ..SessionOptions::default()
     };

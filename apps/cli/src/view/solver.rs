@@ -2,11 +2,12 @@
 
 mod telling;
 
-use super::board::Board;
+use super::board::{Board, Notice, Subject};
 use super::history::{self, Gesture, History, targets};
 use super::wire::{self, CameraPlace, Refused, Request, Say};
 use radiosity::session::{Edit, EditError, Layer, Model, ObjectId, Plane, Session, SurfacePlace, Survey};
 use radiosity::{Bands, Scene};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -62,6 +63,8 @@ pub struct Solver {
     /// Objects that came or came back, whose light is told when it is known: it may be what it was when they went, but not what
     /// was told last.
     back: BTreeSet<ObjectId>,
+    /// Objects that had elements once that were cut.
+    cut: BTreeSet<ObjectId>,
     /// Who wants all there is, when the last edit is seen.
     exports: Vec<oneshot::Sender<Export>>,
     /// Layers that pages look at.
@@ -178,6 +181,7 @@ impl Solver {
             cameras: Vec::new(),
             changed: BTreeSet::new(),
             back: BTreeSet::new(),
+            cut: BTreeSet::new(),
             exports: Vec::new(),
             shown: Vec::new(),
             last_post: None,
@@ -422,13 +426,18 @@ impl Solver {
                 continue;
             }
             let started = Instant::now();
-            for id in std::mem::take(&mut shown.owed) {
-                if self.model.objects.get(id.0 as usize).is_some_and(|object| !object.deleted) {
-                    let light = wire::halves(&self.session.light(id, layer));
-                    self.board.post_light(layer, id.0, &light);
+            let owed = std::mem::take(&mut shown.owed);
+            let is_there = |id: &&ObjectId| self.model.objects.get(id.0 as usize).is_some_and(|object| !object.deleted);
+            let owed: Vec<ObjectId> = owed.iter().filter(is_there).copied().collect();
+            let light: Vec<_> = owed.par_iter().map(|id| self.light_of(*id, layer)).collect();
+            for (id, (cuts, light)) in owed.into_iter().zip(light) {
+                if !cuts.is_empty() || self.cut.contains(&id) {
+                    self.cut.insert(id);
+                    self.board.post(Subject::Cuts(id.0), Notice::Binary(wire::cuts(id, &cuts)));
                 }
+                self.board.post_light(layer, id.0, &light);
             }
-            shown.last = Some((Instant::now(), started.elapsed()));
+            self.shown[place].last = Some((Instant::now(), started.elapsed()));
         }
         self.changed.clear();
     }

@@ -28,6 +28,7 @@ const UNIT: f32 = 16.0;
 
 const MESH: u32 = 1;
 const LIGHT: u32 = 2;
+const CUTS: u32 = 3;
 const HAS_UVS: u32 = 1;
 const HAS_COLOURS: u32 = 2;
 
@@ -441,6 +442,12 @@ pub fn mesh(object: &ModelObject, scene: &Scene) -> Bytes {
     let floats = object.positions.iter().flatten().chain(object.uvs.iter().flatten());
     let floats = floats.chain(colours.iter().flatten()).map(|x| x.to_bits());
     words.chain(floats).chain(object.indices.iter().copied()).flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
+}
+
+/// The elements of an object that are cut, each with its parts along each side.
+pub fn cuts(object: ObjectId, cuts: &[(u32, u32)]) -> Bytes {
+    let words = [CUTS, object.0].into_iter().chain(cuts.iter().flat_map(|(element, parts)| [*element, *parts]));
+    words.flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
 }
 
 /// Light at vertices, as it is sent.

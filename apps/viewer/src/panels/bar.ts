@@ -18,8 +18,7 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
   redo.setAttribute('aria-label', 'Redo');
   const menu = el('div', { class: 'menu', id: 'saves', role: 'menu', 'aria-labelledby': 'save', hidden: true },
     el('button', { type: 'button', role: 'menuitem', tabindex: -1, click: () => { screenshot(app); open(false); } }, 'Screenshot', el('span', { class: 'quiet' }, '.png')),
-    el('a', { role: 'menuitem', tabindex: -1, href: 'lit.glb', download: '', click: () => open(false) }, 'Lit model', el('span', { class: 'quiet' }, '.glb')),
-    el('a', { role: 'menuitem', tabindex: -1, href: 'scene.glb', download: '', click: () => open(false) }, 'Edited scene', el('span', { class: 'quiet' }, '.glb')));
+    download(app, 'Lit model', 'lit.glb', () => open(false)), download(app, 'Edited scene', 'scene.glb', () => open(false)));
   const save = button('Save', () => open(menu.hidden !== false), { title: 'Screenshot, lit model, edited scene' });
   save.id = 'save';
   save.setAttribute('aria-haspopup', 'menu');
@@ -105,4 +104,15 @@ export function duration(seconds: number): string {
   if (seconds < 10) return `${seconds.toFixed(1)} s`;
   if (seconds < 90) return `${Math.round(seconds)} s`;
   return `${Math.round(seconds / 60)} min`;
+}
+
+/** A file that the program makes. */
+function download(app: App, label: string, file: string, close: () => void): HTMLElement {
+  const click = (event: Event) => {
+    close();
+    if (app.isConnected) return app.say(`${label}: the program makes the file; the browser says when it is there.`);
+    event.preventDefault();
+    app.refuse(`${label}: nothing was saved, as the connection to the program was lost.`);
+  };
+  return el('a', { role: 'menuitem', tabindex: -1, href: file, download: '', click }, label, el('span', { class: 'quiet' }, file.slice(file.indexOf('.'))));
 }

@@ -167,6 +167,16 @@ impl Display {
         std::array::from_fn(|band| (1.0 - v - w) * a[band] + v * b[band] + w * c[band])
     }
 
+    /// The spot of a vertex.
+    pub fn spot_of(&self, vertex: u32) -> usize {
+        self.spot[vertex as usize] as usize
+    }
+
+    /// What follows from the elements around each spot, which come with their weights.
+    pub fn around_spots<T>(&self, of: impl Fn(&[(u32, f32)]) -> T) -> Vec<T> {
+        self.starts.windows(2).map(|ends| of(&self.around[ends[0] as usize..ends[1] as usize])).collect()
+    }
+
     /// Means of the elements around each spot, as far as they are not buried, and their area there.
     fn at_spots<const N: usize>(
         &self,

@@ -36,6 +36,7 @@ mod added;
 mod carry;
 mod check;
 mod display;
+mod edges;
 mod edit;
 mod light;
 mod model;
@@ -60,6 +61,7 @@ pub use survey::{Reading, SurfacePlace, Survey, Surveyed};
 use crate::Error;
 use carry::Done;
 use display::{Display, Weights};
+use edges::Edges;
 use light::{Light, MOST_COLUMNS, Strand};
 use paint::Paint;
 use radiosity_scene::{Bands, Scene};
@@ -83,13 +85,22 @@ pub struct SessionOptions {
     /// Most shadow rays from an element to a light, a power of two up to 64. `None` shares 64 out among the lights, 8 each
     /// at least.
     pub shadow_rays: Option<u32>,
+    /// Most places at which light is found where it has an edge within elements, for display ([`Session::cuts`]).
+    pub places: usize,
     /// Most memory for rays and columns of light, bytes.
     pub memory: usize,
 }
 
 impl Default for SessionOptions {
     fn default() -> Self {
-        SessionOptions { element_size: None, elements: 60_000, rays: 256, shadow_rays: None, memory: 4 << 30 }
+        SessionOptions {
+            element_size: None,
+            elements: 60_000,
+            rays: 256,
+            shadow_rays: None,
+            places: 0,
+            memory: 4 << 30,
+        }
     }
 }
 
@@ -124,6 +135,8 @@ pub struct Status {
     pub seconds: f64,
     /// Bytes that rays and columns take.
     pub memory: usize,
+    /// Whether only edges within elements are left to look for.
+    pub is_solved: bool,
     /// Whether nothing is left to do.
     pub is_done: bool,
 }
@@ -140,6 +153,10 @@ pub struct Session {
     strands: Vec<Strand>,
     answer: Answer,
     state: State,
+    edges: Edges,
+    most_places: usize,
+    /// Width of an element, metres.
+    element_size: f64,
     memory: usize,
     /// Weights of averages by object, and of which revision they are.
     weights: Mutex<BTreeMap<usize, (u64, Arc<Weights>)>>,
@@ -237,6 +254,9 @@ impl Session {
             strands: Vec::new(),
             answer: Answer::default(),
             state: State::dark(),
+            edges: Edges::default(),
+            most_places: options.places,
+            element_size: size,
             memory: options.memory,
             weights: Mutex::default(),
             cache: Mutex::default(),
@@ -325,6 +345,9 @@ impl Session {
                 self.live.set_strength(column, &strength);
             }
         }
+        if done.traces || !done.strands.is_empty() || !done.dimmed.is_empty() {
+            self.doubt();
+        }
         let keeps_columns = !(done.repaints || done.traces || !done.dimmed.is_empty());
         self.state.edited(keeps_columns);
         let ids = |of: &BTreeSet<usize>| of.iter().map(|index| *index as u32).collect::<Vec<_>>();
@@ -372,6 +395,7 @@ impl Session {
             rays_traced: self.live.rays_traced(),
             seconds: self.state.seconds,
             memory: bytes(self.live.ids(), most, self.strands.len()),
+            is_solved: self.is_solved(),
             is_done: self.is_done(),
         }
     }

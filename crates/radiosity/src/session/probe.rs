@@ -183,15 +183,20 @@ impl Session {
             let (whole, lamps) = (of(&kept.values, element), of(&kept.lamps, element));
             display::Light { lamps, rest: std::array::from_fn(|band| whole[band] - lamps[band]) }
         };
-        let chunks = self.chunks_of(object.0 as usize);
-        let is_buried = |element: u32| {
-            let place = chunks.partition_point(|chunk| chunk.first <= element).saturating_sub(1);
-            chunks.get(place).is_some_and(|chunk| chunk.is_buried((element - chunk.first) as usize))
-        };
+        let is_buried = self.buried(object.0 as usize);
         // An error is not made less.
         let is_error = matches!(layer, Layer::Error | Layer::RelativeError);
-        let weights = (!is_error).then(|| self.weights(object.0 as usize, first, is_buried)).flatten();
+        let weights = (!is_error).then(|| self.weights(object.0 as usize, first, &is_buried)).flatten();
         self.display(object.0 as usize).light(at, weights.as_deref(), is_buried)
+    }
+
+    /// Whether elements of an object are covered by others.
+    pub(super) fn buried(&self, object: usize) -> impl Fn(u32) -> bool {
+        let chunks = self.chunks_of(object);
+        move |element| {
+            let place = chunks.partition_point(|chunk| chunk.first <= element).saturating_sub(1);
+            chunks.get(place).is_some_and(|chunk| chunk.is_buried((element - chunk.first) as usize))
+        }
     }
 
     /// By what the light at the vertices of an object is averaged in the state that is shown: found once for all its layers.
@@ -228,7 +233,7 @@ impl Session {
         elements.map(|(element, share)| body.area(element) * f64::from(share)).collect()
     }
 
-    fn chunks_of(&self, body: usize) -> &[Chunk] {
+    pub(super) fn chunks_of(&self, body: usize) -> &[Chunk] {
         let chunks = self.live.chunks();
         let [from, to] = [body, body + 1].map(|body| chunks.partition_point(|chunk| chunk.body < body));
         &chunks[from..to]

@@ -124,9 +124,14 @@ impl State {
 }
 
 impl Session {
+    /// Whether the light is that of a fresh session.
+    pub(super) fn is_solved(&self) -> bool {
+        self.state.has_columns && self.state.is_summed && self.state.rest.is_some() && !self.state.errors.is_empty()
+    }
+
     /// Whether nothing is left to do.
     pub(super) fn is_done(&self) -> bool {
-        self.state.has_columns && self.state.is_summed && self.state.rest.is_some() && !self.state.errors.is_empty()
+        self.is_solved() && self.is_sharp()
     }
 
     /// One piece of work: as many rays as there is time for, or a sweep.
@@ -134,10 +139,11 @@ impl Session {
         let (target, most) = (self.live.target(), self.live.most());
         if self.state.has_columns {
             // The second so that the next edit need not do it, the third as each dimming makes another noise.
-            return match (self.state.is_summed, self.state.rest.is_some()) {
-                (false, _) => self.sum_columns(),
-                (true, false) => self.find_rest(),
-                (true, true) => self.judge(),
+            return match &self.state {
+                State { is_summed: false, .. } => self.sum_columns(),
+                State { rest: None, .. } => self.find_rest(),
+                State { errors, .. } if errors.is_empty() => self.judge(),
+                _ => self.sharpen(deadline),
             };
         }
         if target.rays == 0 {

@@ -156,7 +156,7 @@ impl Session {
             let irradiance: Bands = std::array::from_fn(|band| 0.5 * (halves[0][band] + halves[1][band]));
             let [a, b] = halves.map(luminance);
             let light = shown.entry(place.object).or_insert_with(|| self.light(place.object, super::Layer::Total));
-            let shown = luminance(self.display(place.object.0 as usize).at(light, place.triangle, place.uv));
+            let shown = luminance(self.shown_at(place.object.0 as usize, light, place.triangle, place.uv));
             let most = shown.max(0.5 * (a + b)).max(f32::MIN_POSITIVE);
             if a > 0.0 || b > 0.0 || shown > 0.0 {
                 // Each half is off by its own noise: in the mean their product has none.

@@ -460,6 +460,11 @@ impl Chunk {
         self.shadows[column].light[e].map(|x| x * self.open[e])
     }
 
+    /// The share of the shadow rays from an element to a column that came through.
+    pub fn clear_share(&self, column: usize, e: usize) -> f32 {
+        self.shadows[column].clear_share(e)
+    }
+
     /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs; of fewer entries where an edit has left
     /// only as many. Of fewer than there are in the first part as many are taken to count as in all of it.
     #[inline(always)]

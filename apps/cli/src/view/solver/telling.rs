@@ -4,7 +4,7 @@ use super::Solver;
 use crate::view::board::{Notice, Subject};
 use crate::view::wire::{self, CameraPlace, PlaneAnswer, ProbeAnswer, Say, Share};
 use radiosity::session::{
-    LightKind, ModelLight, ModelObject, ObjectId, PlaneError, PlaneReading, Probe, Reading, Surveyed,
+    Layer, LightKind, ModelLight, ModelObject, ObjectId, PlaneError, PlaneReading, Probe, Reading, Surveyed,
 };
 use radiosity::{Bands, luminance};
 
@@ -63,6 +63,16 @@ impl Solver {
         self.board.post(Subject::Mesh(object.id.0), Notice::Binary(mesh));
     }
 
+    /// Which elements of an object are cut, and the light of a layer as it is sent: of its vertices, and after those of the places of
+    /// these elements.
+    pub(super) fn light_of(&self, id: ObjectId, layer: Layer) -> (Vec<(u32, u32)>, Vec<u16>) {
+        let mut light = self.session.light(id, layer);
+        if !light.is_empty() {
+            light.extend(self.session.light_of_cuts(id, layer, &light));
+        }
+        (self.session.cuts(id), wire::halves(&light))
+    }
+
     pub(super) fn post_object(&self, object: &ModelObject) {
         self.say(Subject::Object(object.id.0), wire::object(object, self.session.scene()));
     }
@@ -101,6 +111,7 @@ impl Solver {
             },
             (false, true) => "Following the change".to_owned(),
             (false, false) if status.rays == 0 => "First light".to_owned(),
+            (false, false) if status.is_solved => "Sharpening edges of shadows".to_owned(),
             (false, false) if status.rays == status.most_rays => "Telling lights apart".to_owned(),
             (false, false) => format!("Tracing rays: {} of {} an element", status.rays, status.most_rays),
         };

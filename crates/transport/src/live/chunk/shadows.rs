@@ -19,6 +19,13 @@ pub struct Shadows {
     pub is_rough: Vec<bool>,
 }
 
+impl Shadows {
+    /// The share of the shadow rays of an element that came through.
+    pub fn clear_share(&self, e: usize) -> f32 {
+        self.clear[e].count_ones() as f32 / self.rays.max(1) as f32
+    }
+}
+
 impl Chunk {
     /// Adds up the light of a column anew, whose strengths have changed.
     pub fn add_up(&mut self, work: &Work, column: usize) {

@@ -1,0 +1,101 @@
+// Elements in which light has an edge: drawn again over the whole ones, cut into parts whose corners have light of their own.
+import { Surface } from './surface';
+import type { CutsFrame, MeshFrame } from './wire';
+
+/** Where a row of places begins. */
+const row = (parts: number, j: number) => j * (parts + 1) - (j * (j - 1)) / 2;
+
+const count = (parts: number) => row(parts, parts + 1);
+
+/** An element that is cut into so many parts along each side. */
+class Cutting {
+  /** Weights of the corners at the places, row by row as the server counts them. */
+  readonly weights: number[][] = [];
+  /** The parts as triples of places. */
+  readonly triangles: number[] = [];
+
+  constructor(parts: number) {
+    for (let j = 0; j <= parts; j += 1) {
+      for (let i = 0; i <= parts - j; i += 1) {
+        this.weights.push([1 - (i + j) / parts, i / parts, j / parts]);
+        const [here, above] = [row(parts, j) + i, row(parts, j + 1) + i];
+        if (i + j < parts) this.triangles.push(here, here + 1, above);
+        if (i + j < parts - 1) this.triangles.push(here + 1, above + 1, above);
+      }
+    }
+  }
+}
+
+const cuttings = new Map<number, Cutting>();
+
+function cutting(parts: number): Cutting {
+  let found = cuttings.get(parts);
+  if (!found) {
+    found = new Cutting(parts);
+    cuttings.set(parts, found);
+  }
+  return found;
+}
+
+/** The elements of a surface that are cut, as a surface of their own that nothing else meets. */
+export class Cuts extends Surface {
+  constructor(whole: Surface, frame: CutsFrame) {
+    const { position, uv, paint } = whole.geometry.attributes;
+    const index = whole.geometry.index!;
+    const places = frame.cuts.reduce((sum, [, parts]) => sum + count(parts), 0);
+    const of = (attribute: typeof position) => ({ from: attribute.array, size: attribute.itemSize, to: new Float32Array(attribute.itemSize * places) });
+    const values = [position, uv, paint].map(of);
+    const indices = new Uint32Array(frame.cuts.reduce((sum, [, parts]) => sum + 3 * parts * parts, 0));
+    const firsts = new Map<number, [number, number]>();
+    let [first, corner] = [0, 0];
+    for (const [element, parts] of frame.cuts) {
+      firsts.set(element, [first, parts]);
+      const { weights, triangles } = cutting(parts);
+      const corners = [0, 1, 2].map((k) => index.getX(3 * element + k));
+      weights.forEach((weight, place) => {
+        for (const { from, size, to } of values) {
+          for (let k = 0; k < size; k += 1) {
+            let sum = 0;
+            for (let c = 0; c < 3; c += 1) sum += weight[c] * from[size * corners[c] + k];
+            to[size * (first + place) + k] = sum;
+          }
+        }
+      });
+      for (const place of triangles) {
+        indices[corner] = first + place;
+        corner += 1;
+      }
+      first += weights.length;
+    }
+    const mesh: MeshFrame = { object: whole.object, positions: values[0].to, uvs: values[1].to, colours: values[2].to, indices };
+    // The whole ones beneath reach beyond borders already.
+    super(whole.object, mesh, new Float32Array(3 * places));
+    this.firsts = firsts;
+    this.look = whole.look;
+    this.matrix = whole.matrix;
+    this.visible = whole.visible;
+  }
+
+  /** The first place of each element, and its parts. */
+  private readonly firsts: Map<number, [number, number]>;
+
+  /** How many elements are cut. */
+  get size(): number {
+    return this.firsts.size;
+  }
+
+  override around(element: number, [v, w]: [number, number]): [number, number][] | null {
+    const own = this.firsts.get(element);
+    if (own === undefined) return null;
+    const [first, parts] = own;
+    const [x, y] = [v, w].map((weight) => Math.min(1, Math.max(0, weight)) * parts);
+    const j = Math.min(Math.floor(y), parts - 1);
+    const i = Math.min(Math.floor(x), parts - 1 - j);
+    const at = (i: number, j: number) => first + row(parts, j) + i;
+    const [a, b] = [x - i, y - j];
+    // Of the two halves of a cell the upper is not there at the slanting side.
+    const isLower = a + b <= 1 || i + j + 2 > parts;
+    const third: [number, number] = isLower ? [at(i, j), 1 - a - b] : [at(i + 1, j + 1), a + b - 1];
+    return [third, [at(i + 1, j), isLower ? a : 1 - b], [at(i, j + 1), isLower ? b : 1 - a]];
+  }
+}
