@@ -71,7 +71,7 @@ const WAITING: usize = 256;
 
 /// Most places at which light is found where it has an edge within elements: pages draw two triangles for each, and twelve bytes come
 /// with every change of it.
-const PLACES: usize = 250_000;
+const PLACES: usize = 150_000;
 
 /// How long open connections have to end.
 const FAREWELL: Duration = Duration::from_millis(500);

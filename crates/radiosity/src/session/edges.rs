@@ -19,10 +19,10 @@ use std::time::Instant;
 
 /// Parts of the width that elements have at most into which those are cut that have an edge: of lamps without area, and of others, whose
 /// edges are softer.
-const PARTS: [f64; 2] = [24.0, 12.0];
+const PARTS: [f64; 2] = [16.0, 8.0];
 
 /// Most parts of a side, and those by which it is seen whether there is an edge.
-const MOST_PARTS: u32 = 24;
+const MOST_PARTS: u32 = 16;
 const PROBE: u32 = 6;
 
 /// Least difference among neighbours that is looked after, over the light there: half as much is hard to see beside the noise.
@@ -184,7 +184,6 @@ impl Session {
 
     /// Lamps or what stands in their light have changed. Elements stay cut that have the same light of them as before.
     pub(super) fn doubt(&mut self) {
-        self.state.changed.extend(self.edges.cuts.keys().map(|key| key.0));
         let cuts = std::mem::take(&mut self.edges.cuts);
         self.edges = Edges { cuts, is_old: true, ..Edges::default() };
     }
