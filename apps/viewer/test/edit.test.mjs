@@ -440,6 +440,22 @@ test('the sky is known by its lux, and follows them', async () => {
   await outside.end();
 });
 
+test('shadows have sharp edges, also when what casts them was moved', () => inStudio(async (page) => {
+  // The bulb at (0, 1.2, -0.8) shines below the lower edge of the sheet, y = 0.5, as far as z = -0.8 + (0.8 + z of the sheet) 1.2 / 0.7.
+  const edge = (z) => -0.8 + ((0.8 + z) * 1.2) / 0.7;
+  const across = (z) => page.evaluate((places) => places.map((z) => window.radiosity.lux([-0.3, 0, z, 0, 1, 0])), [-0.03, 0.03].map((way) => edge(z) + way));
+  const [lit, dark] = await across(0);
+  assert.ok(lit > 3 * dark && dark > 0, `${lit} lx and ${dark} lx`);
+  const { edits } = (await state(page)).status;
+  const { id } = await named(page, 'sheet');
+  await page.evaluate((object) => window.radiosity.app.edit({ move: { object, matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0.3, 1] } }), id);
+  await done(page, edits + 1);
+  const [now, behind] = await across(0.3);
+  assert.ok(now > 3 * behind && behind > 0, `${now} lx and ${behind} lx`);
+  assert.ok((await across(0)).every((lux) => lux > 0.7 * lit), 'where the edge was light is even');
+  await picture(page, 'edges');
+}));
+
 test('lamps without area, sheets and colours at vertices', () => inStudio(async (page) => {
   await page.evaluate(() => window.radiosity.app.exposure.set(-5));
 

@@ -67,6 +67,8 @@ export async function browser() {
       const context = await own.newContext({ viewport: { width, height }, hasTouch: touch, isMobile: touch, acceptDownloads: true });
       if (process.env.PAGE) await context.route(url, instead);
       const page = await context.newPage();
+      // A machine that others use is slow.
+      page.setDefaultTimeout(120_000);
       page.faults = [];
       page.asked = [];
       page.on('console', (message) => {

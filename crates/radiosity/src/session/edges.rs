@@ -1,8 +1,9 @@
 //! Edges of light within elements.
 //!
 //! The light that is shown runs evenly from corner to corner of an element, and an edge of a shadow within one is as wide as the
-//! element. Where lamps light neighbours so differently that one sees it, elements are cut for display: at places all over them the
-//! light of such a lamp is found by shadow rays of their own. Patches shoot and elements receive (Cohen, Greenberg, Immel and Brock
+//! element. Where the sun or lamps without area light neighbours so differently that one sees it, elements are cut for display: at
+//! places all over them the light of such a lamp is found by shadow rays of their own. Lamps with area have softer edges, and what few
+//! rays to them find at a place is noisier than what is shown: walls of an office with twelve panels became mottled. Patches shoot and elements receive (Cohen, Greenberg, Immel and Brock
 //! 1986, "An efficient radiosity approach for realistic image synthesis"): what surfaces give off is that of whole elements still.
 //!
 //! Kept is by how much the places differ from what is shown there, for a lamp that is not dimmed: it can be added to every layer
@@ -17,12 +18,8 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-/// Parts of the width that elements have at most into which those are cut that have an edge: of lamps without area, and of others, whose
-/// edges are softer.
-const PARTS: [f64; 2] = [16.0, 8.0];
-
-/// Most parts of a side, and those by which it is seen whether there is an edge.
-const MOST_PARTS: u32 = 16;
+/// Parts of a side of elements as wide as they may be, in which there is an edge, and by which it is seen whether there is one.
+const PARTS: u32 = 16;
 const PROBE: u32 = 6;
 
 /// Least difference among neighbours that is looked after, over the light there: half as much is hard to see beside the noise.
@@ -34,11 +31,8 @@ const EVEN: f32 = 0.05;
 /// How many times the places that may be in the end are looked at for edges: most elements beside one have none.
 const LOOKED_AT: usize = 4;
 
-/// Shadow rays of a place, and after how many no more follow if all have found the same.
-const RAYS: [u32; 2] = [8, 32];
-
-/// Where around a place lamps without area are looked for, in widths of a part: edges of their shadows would be stairs. As far as the
-/// next places, so that none is between them.
+/// Where around a place light is looked for, in widths of a part: edges of shadows would be stairs. As far as the next places, so that
+/// nothing is between them.
 const AROUND: [[f32; 2]; 8] = [
     [-0.1875, -0.5625],
     [0.5625, -0.1875],
@@ -251,7 +245,7 @@ impl Session {
     fn edges_in_sight(&self) -> Vec<Wanted> {
         let lit = |(strand, own): (usize, &Strand)| {
             let factor = luminance(self.factor(own));
-            own.column.filter(|column| factor > 0.0 && self.live.has_lamps(*column)).map(|_| (strand, factor))
+            own.column.filter(|column| factor > 0.0 && self.live.is_certain(*column)).map(|_| (strand, factor))
         };
         let strands: Vec<(usize, f32)> = self.strands.iter().enumerate().filter_map(lit).collect();
         let of_object = |object: usize| self.edges_on(object, &strands);
@@ -276,11 +270,10 @@ impl Session {
             let light: Vec<(Bands, f32)> = (0..body.elements()).map(light).collect();
             let ranges =
                 self.display(object).ranges(|element| luminance(light[element as usize].0), self.buried(object));
-            let is_certain = self.live.is_certain(self.strands[*strand].column);
             for (element, [low, high]) in (0..).zip(ranges) {
                 // A shadow narrower than elements makes no difference among them.
                 let (own, share) = light[element as usize];
-                let is_crossed = is_certain && share > 0.0 && share < 1.0;
+                let is_crossed = share > 0.0 && share < 1.0;
                 let [low, high] = if is_crossed { [0.0, high.max(luminance(own) / share)] } else { [low, high] };
                 let all = self.state.shown[(body.first + element) as usize].0;
                 let all = luminance([all[0], all[1], all[2]]).max(factor * high);
@@ -289,9 +282,7 @@ impl Session {
                     continue;
                 }
                 let width = (2.0 * body.area(element)).sqrt();
-                let parts = (PARTS[usize::from(!is_certain)] * width / self.element_size)
-                    .ceil()
-                    .clamp(1.0, MOST_PARTS.into()) as u32;
+                let parts = (f64::from(PARTS) * width / self.element_size).ceil().clamp(1.0, PARTS.into()) as u32;
                 let key = (object, element);
                 let one = found.entry(key).or_insert(Wanted { key, weight: 0.0, parts, strands: Vec::new() });
                 one.weight = one.weight.max(contrast * (width as f32).sqrt());
@@ -308,22 +299,20 @@ impl Session {
         let world = self.live.world();
         let (body, display) = (&world.bodies[object], self.display(object));
         let turned = DMat3::from_mat4(DMat4::from(body.matrix)).inverse().transpose();
-        let around: &[[f32; 2]] = if self.live.is_certain(Some(column)) { &AROUND } else { &[[0.0; 2]] };
         let found = |[v, w]: [f32; 2]| {
             let inwards = |x: f32| x + INWARDS * (1.0 / 3.0 - x);
             let (t, side, at) = body.point(element, [inwards(v), inwards(w)]);
             let flat = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
             let smooth = (turned * display.normal(element, [v, w])).normalize_or_zero();
             let normal = if smooth.dot(flat) > 0.0 { smooth } else { flat };
-            let (_, _, seed) = body.point(element, [v, w]);
-            self.live.receive_from(column, (at + world.middle, normal), seed, RAYS)
+            self.live.receive_from(column, (at + world.middle, normal))
         };
         let difference = |[v, w]: [f32; 2]| {
             let mut sum = [0f32; 3];
-            for [x, y] in around {
+            for [x, y] in AROUND {
                 let [x, y] = [v + x / parts as f32, w + y / parts as f32].map(|x| x.max(0.0));
                 let found = found([x, y].map(|k| k / (x + y).max(1.0)));
-                (0..3).for_each(|band| sum[band] += found[band] / around.len() as f32);
+                (0..3).for_each(|band| sum[band] += found[band] / AROUND.len() as f32);
             }
             let shown = display.at(shown, element, [v, w]);
             std::array::from_fn(|band| sum[band] - shown[band])

@@ -83,37 +83,15 @@ impl Live {
         Arrival { found, direct: direct.collect() }
     }
 
-    /// Whether the lamps of a column have no area, so that each shadow ray finds the same; so it is where there is none.
-    pub fn is_certain(&self, column: Option<usize>) -> bool {
-        column.is_none_or(|column| self.columns[column].is_certain())
+    /// Whether a column has lamps, and none of them has an area: each shadow ray from a point finds the same.
+    pub fn is_certain(&self, column: usize) -> bool {
+        !self.columns[column].is_empty() && self.columns[column].is_certain()
     }
 
-    /// What a column brings straight to a point of the world with a unit normal, lux per band: by the first number of shadow rays, or the
-    /// second where these do not all find the same. `seed` is the point about the middle of the scene, or one near it that several share.
-    pub fn receive_from(&self, column: usize, (point, normal): (DVec3, DVec3), seed: DVec3, rays: [u32; 2]) -> Bands {
-        let column = &self.columns[column];
-        if column.is_empty() {
-            return [0.0; 3];
-        }
-        let world = &self.world;
-        let site = Site::in_the_air(point - world.middle, normal);
-        let seed = seed.as_vec3().to_array().iter().fold(0x3c6e_f372, |seed, x| hash(seed ^ x.to_bits()));
-        let sequence = column.sequence(seed);
-        let (mut sum, mut clear, mut counted) = ([0f64; 3], 0, 0);
-        for most in if column.is_certain() { [1; 2] } else { rays } {
-            for index in counted..most {
-                let Some(sample) = column.sample(world, &site, (seed, &sequence), index) else { continue };
-                if !world.blocked(&sample.ray, sample.salt) {
-                    clear += 1;
-                    (0..3).for_each(|band| sum[band] += sample.light[band]);
-                }
-            }
-            counted = most;
-            if clear == 0 || clear == counted {
-                break;
-            }
-        }
-        sum.map(|x| (x / f64::from(counted)) as f32)
+    /// What a column that is certain brings straight to a point of the world with a unit normal, lux per band.
+    pub fn receive_from(&self, column: usize, (point, normal): (DVec3, DVec3)) -> Bands {
+        let site = Site::in_the_air(point - self.world.middle, normal);
+        self.direct(&self.columns[column], &site, 0, 1)[0].map(|x| x as f32)
     }
 
     /// What a column brings straight to a place, by the halves of its rays.
