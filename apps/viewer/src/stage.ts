@@ -38,6 +38,9 @@ const IN_A_ROW = 4;
 /** Milliseconds of rest before all is drawn sharp. */
 const REST = 250;
 
+/** Milliseconds after which light has come, if any does. */
+const LATE = 100;
+
 /** The picture that the meter sees. */
 export const METER = [64, 40];
 
@@ -72,6 +75,8 @@ export class Stage {
   /** The elements that are cut, by object, and what light there is beyond the vertices. */
   private cuts = new Map<number, Cuts>();
   private beyond = new Map<number, Uint16Array>();
+  /** Cuts whose light has not come. */
+  private coming = new Map<number, CutsFrame>();
   private sky: Mesh<SphereGeometry, ShaderMaterial>;
   private meter = new WebGLRenderTarget(METER[0], METER[1], { type: FloatType, format: RGBAFormat });
   private isMetering = false;
@@ -225,6 +230,7 @@ export class Stage {
       this.beyond.set(object, beyond);
     }
     beyond.set(values, 3 * first);
+    if (this.coming.has(object)) return this.reveal(object);
     const cuts = this.cuts.get(object);
     if (!cuts) return;
     const count = Math.min(values.length / 3, cuts.light.count - first);
@@ -233,20 +239,29 @@ export class Stage {
     this.batches.shine(cuts, first, count);
   }
 
-  /** Other elements of an object are cut than before. */
+  /** Other elements of an object are cut than before. They are drawn when light of theirs has come: what is there is that of others. */
   cut(frame: CutsFrame): void {
-    const old = this.cuts.get(frame.object);
+    this.coming.set(frame.object, frame);
+    if (frame.cuts.length === 0) this.reveal(frame.object);
+    // Where all of it is as it was, none comes.
+    else setTimeout(() => { if (this.coming.get(frame.object) === frame) this.reveal(frame.object); }, LATE);
+  }
+
+  private reveal(object: number): void {
+    const frame = this.coming.get(object)!;
+    this.coming.delete(object);
+    const old = this.cuts.get(object);
     if (old) {
       this.batches.remove(old);
       old.dispose();
-      this.cuts.delete(frame.object);
+      this.cuts.delete(object);
     }
-    const surface = this.surfaces.get(frame.object);
+    const surface = this.surfaces.get(object);
     if (surface && frame.cuts.length > 0) {
       const cuts = new Cuts(surface, frame);
       const light = cuts.light.array as Uint16Array;
-      light.set((this.beyond.get(frame.object) ?? new Uint16Array(0)).subarray(0, light.length));
-      this.cuts.set(frame.object, cuts);
+      light.set((this.beyond.get(object) ?? new Uint16Array(0)).subarray(0, light.length));
+      this.cuts.set(object, cuts);
       this.batches.put(cuts);
     }
     this.change();
