@@ -1,4 +1,5 @@
 // Elements in which light has an edge: drawn again over the whole ones, cut into parts whose corners have light of their own.
+import { DataUtils } from 'three';
 import { Surface } from './surface';
 import type { CutsFrame, MeshFrame } from './wire';
 
@@ -43,8 +44,9 @@ export class Cuts extends Surface {
     const { position, uv, paint } = whole.geometry.attributes;
     const index = whole.geometry.index!;
     const places = frame.cuts.reduce((sum, [, parts]) => sum + count(parts), 0);
-    const of = (attribute: typeof position) => ({ from: attribute.array, size: attribute.itemSize, to: new Float32Array(attribute.itemSize * places) });
-    const values = [position, uv, paint].map(of);
+    const of = (from: ArrayLike<number>, size: number) => ({ from, size, to: new Float32Array(size * places) });
+    const light = Float32Array.from(whole.light.array, (half) => DataUtils.fromHalfFloat(half));
+    const values = [...[position, uv, paint].map(({ array, itemSize }) => of(array, itemSize)), of(light, 3)];
     const indices = new Uint32Array(frame.cuts.reduce((sum, [, parts]) => sum + 3 * parts * parts, 0));
     const firsts = new Map<number, [number, number]>();
     let [first, corner] = [0, 0];
@@ -70,6 +72,7 @@ export class Cuts extends Surface {
     const mesh: MeshFrame = { object: whole.object, positions: values[0].to, uvs: values[1].to, colours: values[2].to, indices };
     // The whole ones beneath reach beyond borders already.
     super(whole.object, mesh, new Float32Array(3 * places));
+    values[3].to.forEach((lux, k) => { this.light.array[k] = DataUtils.toHalfFloat(lux); });
     this.firsts = firsts;
     this.look = whole.look;
     this.matrix = whole.matrix;
@@ -78,11 +81,6 @@ export class Cuts extends Surface {
 
   /** The first place of each element, and its parts. */
   private readonly firsts: Map<number, [number, number]>;
-
-  /** How many elements are cut. */
-  get size(): number {
-    return this.firsts.size;
-  }
 
   override around(element: number, [v, w]: [number, number]): [number, number][] | null {
     const own = this.firsts.get(element);

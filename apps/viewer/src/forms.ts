@@ -86,10 +86,12 @@ function onCeiling(stage: Stage, side: number, scale: number, isLampOrAdded: (ob
     if (way.length() > 0 && stage.cast(from, way.clone().normalize(), way.length() + 0.5 * side, DoubleSide)) continue;
     const at = clearOf(stage, from.clone().add(way), 0.6 * side, level);
     const above = (x: number, z: number) => stage.cast(at.clone().add(new Vector3(x * side, 0, z * side)), UP, Infinity, DoubleSide);
+    const ceiling = above(0, 0);
     const hits = ACROSS.flatMap((x) => ACROSS.map((z) => above(x, z))).filter((hit) => hit !== null);
-    const isTaken = hits.some((hit) => isLampOrAdded(hit.surface.object));
-    // As low as the lowest of what is above.
-    if (hits.length > 0 && !isTaken) return at.setY(at.y + Math.min(...hits.map(({ distance }) => distance)) - BELOW * scale);
+    const [low, high] = [Math.min(...hits.map(({ distance }) => distance)), Math.max(...hits.map(({ distance }) => distance))];
+    // As low as the lowest of what is above, but not beneath a beam or half beneath a gallery.
+    const isTaken = high - low > 0.5 * side || hits.some((hit) => isLampOrAdded(hit.surface.object));
+    if (ceiling && !isTaken) return at.setY(at.y + low - BELOW * scale);
   }
   return null;
 }

@@ -38,9 +38,6 @@ const IN_A_ROW = 4;
 /** Milliseconds of rest before all is drawn sharp. */
 const REST = 250;
 
-/** Milliseconds after which light has come, if any does. */
-const LATE = 100;
-
 /** The picture that the meter sees. */
 export const METER = [64, 40];
 
@@ -182,7 +179,7 @@ export class Stage {
   remove(object: number): void {
     const old = this.surfaces.get(object);
     if (!old) return;
-    this.cut({ object, cuts: [] });
+    this.cut({ object, number: 0, cuts: [] });
     this.beyond.delete(object);
     this.root.remove(old);
     this.batches.remove(old);
@@ -230,25 +227,26 @@ export class Stage {
       this.beyond.set(object, beyond);
     }
     beyond.set(values, 3 * first);
-    if (this.coming.has(object)) return this.reveal(object);
+    const coming = this.coming.get(object);
+    // The light of a layer may be that of other cuts still.
+    if (first === 0 && coming?.number === beyond[0] + 65536 * beyond[1]) return this.reveal(coming);
     const cuts = this.cuts.get(object);
     if (!cuts) return;
-    const count = Math.min(values.length / 3, cuts.light.count - first);
-    if (count <= 0) return;
-    (cuts.light.array as Uint16Array).set(values.subarray(0, 3 * count), 3 * first);
-    this.batches.shine(cuts, first, count);
+    const [from, to] = [Math.max(first, 1), Math.min(first + values.length / 3, cuts.light.count + 1)];
+    if (to <= from) return;
+    (cuts.light.array as Uint16Array).set(beyond.subarray(3 * from, 3 * to), 3 * (from - 1));
+    this.batches.shine(cuts, from - 1, to - from);
   }
 
-  /** Other elements of an object are cut than before. They are drawn when light of theirs has come: what is there is that of others. */
+  /** Other elements of an object are cut than before. They are drawn when their light comes. */
   cut(frame: CutsFrame): void {
     this.coming.set(frame.object, frame);
-    if (frame.cuts.length === 0) this.reveal(frame.object);
-    // Where all of it is as it was, none comes.
-    else setTimeout(() => { if (this.coming.get(frame.object) === frame) this.reveal(frame.object); }, LATE);
+    if (frame.cuts.length === 0) this.reveal(frame);
   }
 
-  private reveal(object: number): void {
-    const frame = this.coming.get(object)!;
+  /** Draws the elements that are cut now. Light that is what it was does not come again, and what is yet to come is even till then. */
+  private reveal(frame: CutsFrame): void {
+    const { object } = frame;
     this.coming.delete(object);
     const old = this.cuts.get(object);
     if (old) {
@@ -259,8 +257,7 @@ export class Stage {
     const surface = this.surfaces.get(object);
     if (surface && frame.cuts.length > 0) {
       const cuts = new Cuts(surface, frame);
-      const light = cuts.light.array as Uint16Array;
-      light.set((this.beyond.get(object) ?? new Uint16Array(0)).subarray(0, light.length));
+      (cuts.light.array as Uint16Array).set(this.beyond.get(object)!.subarray(3, 3 + 3 * cuts.light.count));
       this.cuts.set(object, cuts);
       this.batches.put(cuts);
     }

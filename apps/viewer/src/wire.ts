@@ -259,10 +259,13 @@ export interface MeshFrame {
 /** Which elements of an object are cut, as light has an edge in them, and into how many parts along each side. */
 export interface CutsFrame {
   object: number;
+  /** Their light begins with it. */
+  number: number;
   cuts: [number, number][];
 }
 
-/** Light of some vertices, three half floats each in units of 16 lx; the places of elements that are cut follow the vertices. */
+/** Light of some vertices, three half floats each in units of 16 lx; after the vertices follow the number of the
+ *  object's cuts, its lower and its upper half, and the places of these. */
 export interface LightFrame {
   object: number;
   first: number;
@@ -290,8 +293,8 @@ function readMesh(buffer: ArrayBuffer): MeshFrame {
 }
 
 function readCuts(buffer: ArrayBuffer): CutsFrame {
-  const [, object, ...words] = new Uint32Array(buffer);
-  return { object, cuts: Array.from({ length: words.length / 2 }, (_, k) => [words[2 * k], words[2 * k + 1]]) };
+  const [, object, number, ...words] = new Uint32Array(buffer);
+  return { object, number, cuts: Array.from({ length: words.length / 2 }, (_, k) => [words[2 * k], words[2 * k + 1]]) };
 }
 
 function* readLight(buffer: ArrayBuffer): Generator<LightFrame> {

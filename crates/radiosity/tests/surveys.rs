@@ -8,6 +8,7 @@ use radiosity::session::{
     Edit, Layer, LightId, NewLight, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed,
 };
 use radiosity::{Material, PointLight, PointLightKind, Scene};
+use rayon::prelude::*;
 use room::{Furnishing, room};
 use std::time::Duration;
 
@@ -124,9 +125,15 @@ fn elements_are_cut_where_light_has_an_edge() {
     let edit = Edit::Move { object: ObjectId(1), matrix };
     session.apply(&edit).unwrap();
     while !session.step(Duration::ZERO).is_complete {}
-    // Far from the shadow nothing changes; what is cut there stays so.
+    // Far from the shadow nothing changes; what is cut there stays so, and the picture is better for it.
     let kept = session.cuts(floor).len();
     assert!((1..cuts.len()).contains(&kept), "{kept} of {}", cuts.len());
+    whole.apply(&edit).unwrap();
+    finish(&mut whole);
+    let (without, with) = (off(&whole), off(&session));
+    assert!(with < without, "{with} instead of {without}");
+    let nothing = ObjectId(99);
+    assert!(session.cuts(nothing).is_empty() && session.light_of_cuts(nothing, Layer::Total, &[]).is_empty());
     finish(&mut session);
     let mut fresh = Session::new(shaded(), &options(30_000)).unwrap();
     fresh.apply(&edit).unwrap();
@@ -140,6 +147,31 @@ fn elements_are_cut_where_light_has_an_edge() {
     assert!(!halves.is_empty());
     for (half, whole) in halves.iter().zip(light(&fresh, Layer::Total)) {
         assert!((half[1] - 0.5 * whole[1]).abs() <= 1e-4 * whole[1].max(1.0), "{half:?} of {whole:?}");
+    }
+}
+
+/// Layers that take the work of all threads are read by many at once.
+#[test]
+fn layers_of_many_objects_are_read_together() {
+    let mut scene = shaded();
+    (0..40).for_each(|k| {
+        let at = DVec3::new(0.1 * f64::from(k) - 2.0, 0.2, -1.0);
+        let corners = [[0., 0.], [0.05, 0.], [0.05, 0.3], [0., 0.3]].map(|[x, y]| at + DVec3::new(x, y, 0.0));
+        scene.add_quad(&format!("slat {k}"), 0, corners);
+    });
+    let options = SessionOptions { elements: 3000, rays: 64, ..SessionOptions::default() };
+    let mut session = Session::new(scene, &options).unwrap();
+    finish(&mut session);
+    let objects: Vec<ObjectId> = session.model().objects.iter().map(|object| object.id).collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
+    for round in 0..60 {
+        // Every change makes the layers anew.
+        let dimming = 1.0 / f64::from(round + 1);
+        session.apply(&Edit::Light { light: LightId(0), dimming: dimming as f32, colour: [1.0; 3] }).unwrap();
+        finish(&mut session);
+        let layer = [Layer::Error, Layer::Bounce(3), Layer::RelativeError][round as usize % 3];
+        let light: Vec<_> = pool.install(|| objects.par_iter().map(|object| session.light(*object, layer)).collect());
+        assert!(light.iter().all(|light| !light.is_empty()));
     }
 }
 

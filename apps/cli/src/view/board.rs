@@ -84,6 +84,12 @@ impl<K: Copy + Eq + std::hash::Hash, V: PartialEq> Latest<K, V> {
         true
     }
 
+    fn remove(&mut self, key: &K) -> bool {
+        let Some((revision, _)) = self.posts.remove(key) else { return false };
+        self.order.remove(&revision);
+        true
+    }
+
     fn after(&self, seen: u64) -> impl Iterator<Item = (u64, &V)> {
         self.order.range(seen + 1..).map(|(revision, key)| (*revision, &self.posts[key].1))
     }
@@ -179,6 +185,11 @@ impl Board {
             if watched.light.post((object, chunk), light, revision + 1) {
                 revision += 1;
             }
+        }
+        // There were more when more of it was cut.
+        let mut past = values.len().div_ceil(3 * CHUNK) as u32;
+        while watched.light.remove(&(object, past)) {
+            past += 1;
         }
         if revision > posts.revision {
             posts.revision = revision;

@@ -2,13 +2,13 @@
 
 mod telling;
 
-use super::board::{Board, Notice, Subject};
+use super::board::Board;
 use super::history::{self, Gesture, History, targets};
-use super::wire::{self, CameraPlace, Refused, Request, Say};
+use super::wire::{CameraPlace, Refused, Request, Say};
 use radiosity::session::{Edit, EditError, Layer, Model, ObjectId, Plane, Session, SurfacePlace, Survey};
 use radiosity::{Bands, Scene};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc::error::TrySendError;
@@ -63,8 +63,8 @@ pub struct Solver {
     /// Objects that came or came back, whose light is told when it is known: it may be what it was when they went, but not what
     /// was told last.
     back: BTreeSet<ObjectId>,
-    /// Objects that had elements once that were cut.
-    cut: BTreeSet<ObjectId>,
+    /// How objects were cut last that were so once, and how often that has changed.
+    cut: BTreeMap<ObjectId, (u32, Vec<(u32, u32)>)>,
     /// Who wants all there is, when the last edit is seen.
     exports: Vec<oneshot::Sender<Export>>,
     /// Layers that pages look at.
@@ -181,7 +181,7 @@ impl Solver {
             cameras: Vec::new(),
             changed: BTreeSet::new(),
             back: BTreeSet::new(),
-            cut: BTreeSet::new(),
+            cut: BTreeMap::new(),
             exports: Vec::new(),
             shown: Vec::new(),
             last_post: None,
@@ -429,12 +429,12 @@ impl Solver {
             let owed = std::mem::take(&mut shown.owed);
             let is_there = |id: &&ObjectId| self.model.objects.get(id.0 as usize).is_some_and(|object| !object.deleted);
             let owed: Vec<ObjectId> = owed.iter().filter(is_there).copied().collect();
-            let light: Vec<_> = owed.par_iter().map(|id| self.light_of(*id, layer)).collect();
+            // The layer itself is found once, by all threads.
+            let first = owed.first().map(|id| self.light_of(*id, layer));
+            let rest = owed.par_iter().skip(1).map(|id| self.light_of(*id, layer));
+            let light: Vec<_> = first.into_par_iter().chain(rest).collect();
             for (id, (cuts, light)) in owed.into_iter().zip(light) {
-                if !cuts.is_empty() || self.cut.contains(&id) {
-                    self.cut.insert(id);
-                    self.board.post(Subject::Cuts(id.0), Notice::Binary(wire::cuts(id, &cuts)));
-                }
+                let light = self.post_cuts(id, cuts, light);
                 self.board.post_light(layer, id.0, &light);
             }
             self.shown[place].last = Some((Instant::now(), started.elapsed()));

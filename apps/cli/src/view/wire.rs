@@ -444,9 +444,9 @@ pub fn mesh(object: &ModelObject, scene: &Scene) -> Bytes {
     words.chain(floats).chain(object.indices.iter().copied()).flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
 }
 
-/// The elements of an object that are cut, each with its parts along each side.
-pub fn cuts(object: ObjectId, cuts: &[(u32, u32)]) -> Bytes {
-    let words = [CUTS, object.0].into_iter().chain(cuts.iter().flat_map(|(element, parts)| [*element, *parts]));
+/// The elements of an object that are cut, each with its parts along each side, and the number that their light has.
+pub fn cuts(object: ObjectId, number: u32, cuts: &[(u32, u32)]) -> Bytes {
+    let words = [CUTS, object.0, number].into_iter().chain(cuts.iter().flat_map(|(element, parts)| [*element, *parts]));
     words.flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
 }
 

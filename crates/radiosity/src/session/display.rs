@@ -185,17 +185,25 @@ impl Display {
     ) -> Vec<([f32; N], f32)> {
         let element = |element: u32| (!is_buried(element)).then(|| of(element));
         let elements: Vec<Option<[f32; N]>> = (0..self.indices.len() as u32 / 3).map(element).collect();
-        let spot = |(ends, area): (&[u32], &f32)| {
-            let (mut sum, mut whole) = ([0f32; N], 0f32);
-            for (element, weight) in &self.around[ends[0] as usize..ends[1] as usize] {
-                if let Some(own) = &elements[*element as usize] {
-                    whole += weight;
-                    (0..N).for_each(|k| sum[k] += weight * own[k]);
-                }
+        (0..self.areas.len()).map(|spot| self.at_spot(spot, |element| elements[element as usize])).collect()
+    }
+
+    /// The mean of the elements around a spot, as far as they are not buried, and their area there.
+    fn at_spot<const N: usize>(&self, spot: usize, of: impl Fn(u32) -> Option<[f32; N]>) -> ([f32; N], f32) {
+        let (mut sum, mut whole) = ([0f32; N], 0f32);
+        for (element, weight) in &self.around[self.starts[spot] as usize..self.starts[spot + 1] as usize] {
+            if let Some(own) = of(*element) {
+                whole += weight;
+                (0..N).for_each(|k| sum[k] += weight * own[k]);
             }
-            (sum.map(|s| if whole > 0.0 { s / whole } else { 0.0 }), whole * area)
-        };
-        self.starts.windows(2).zip(&self.areas).map(spot).collect()
+        }
+        (sum.map(|s| if whole > 0.0 { s / whole } else { 0.0 }), whole * self.areas[spot])
+    }
+
+    /// Direct light at the corners of an element, from that of the elements, none of what is buried: as [`Display::light`] has it.
+    pub fn corners(&self, element: u32, of: impl Fn(u32) -> Option<Bands>) -> [Bands; 3] {
+        let corners = &self.indices[3 * element as usize..][..3];
+        [0, 1, 2].map(|k| self.at_spot(self.spot[corners[k] as usize] as usize, &of).0)
     }
 
     /// The weights of averages, by `guide`, the luminance of what rays found of all light, and the most that is taken for its

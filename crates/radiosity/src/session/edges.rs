@@ -1,25 +1,33 @@
 //! Edges of light within elements.
 //!
 //! The light that is shown runs evenly from corner to corner of an element, and an edge of a shadow within one is as wide as the
-//! element. Where the sun or lamps without area light neighbours so differently that one sees it, elements are cut for display: at
-//! places all over them the light of such a lamp is found by shadow rays of their own. Lamps with area have softer edges, and what few
-//! rays to them find at a place is noisier than what is shown: walls of an office with twelve panels became mottled. Patches shoot and elements receive (Cohen, Greenberg, Immel and Brock
-//! 1986, "An efficient radiosity approach for realistic image synthesis"): what surfaces give off is that of whole elements still.
+//! element. Where the sun or another light without area lights neighbours so differently that one sees it, elements are cut for
+//! display: at places all over them the light of such a lamp is found by shadow rays of their own. Patches shoot and elements receive
+//! (Cohen, Greenberg, Immel and Brock 1986, "An efficient radiosity approach for realistic image synthesis"): what surfaces give off
+//! is that of whole elements still.
+//!
+//! Left out are lamps with area, whose edges are softer, and of which few rays tell less than what is shown: with 32 at a place the walls of
+//! an office with twelve panels became mottled; lights that share a column; and facets of rounded bodies, on which the shadow that these
+//! cast on themselves would show.
 //!
 //! Kept is by how much the places differ from what is shown there, for a lamp that is not dimmed: it can be added to every layer
 //! that has light of this lamp, in whatever light the lamp is now, and stays when lamps are dimmed and walls painted. Where it runs
-//! evenly over an element, its corners are enough.
+//! evenly over an element, its corners are enough. After other edits elements stay cut at whose corners the lamp's light is what it was,
+//! until all are looked for again: an edge within that moved, and changed nothing at the corners, is where it was till then.
 
-use super::display::{Display, Light};
+use super::display::Display;
 use super::{Layer, ObjectId, Session, Strand};
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use radiosity_scene::{Bands, Side, luminance};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-/// Parts of a side of elements as wide as they may be, in which there is an edge, and by which it is seen whether there is one.
+/// Parts of a side of elements as wide as they may be, in which there is an edge: two centimetres in a room of 60,000 elements. With
+/// twice as many, four times the places bring edges of half the width.
 const PARTS: u32 = 16;
+
+/// Parts by which it is seen whether there is an edge: with fewer, shadows of window bars fall between.
 const PROBE: u32 = 6;
 
 /// Least difference among neighbours that is looked after, over the light there: half as much is hard to see beside the noise.
@@ -31,9 +39,9 @@ const EVEN: f32 = 0.05;
 /// How many times the places that may be in the end are looked at for edges: most elements beside one have none.
 const LOOKED_AT: usize = 4;
 
-/// Where around a place light is looked for, in widths of a part: edges of shadows would be stairs. As far as the next places, so that
-/// nothing is between them.
-const AROUND: [[f32; 2]; 8] = [
+/// Where around a place light is looked for, in widths of a part: two squares, turned and of different sizes, so that no two are in a row
+/// along an edge, and as far as half way to the next places. With one alone edges are stairs; these make them a part wide.
+const FOOTPRINT: [[f32; 2]; 8] = [
     [-0.1875, -0.5625],
     [0.5625, -0.1875],
     [0.1875, 0.5625],
@@ -44,11 +52,14 @@ const AROUND: [[f32; 2]; 8] = [
     [-0.1, 0.5],
 ];
 
-/// Elements between looks at the time.
+/// Elements between looks at the time: a millisecond's work.
 const BATCH: usize = 64;
 
 /// How far places at the border of an element are moved towards its middle: beside a wall they would be in it.
 const INWARDS: f32 = 1e-3;
+
+/// Least cosine between the normals of a facet and of its corners, 3°: beyond, a body is rounded.
+const FLAT: f32 = 0.9986;
 
 /// An element of an object.
 type Key = (usize, u32);
@@ -62,15 +73,31 @@ struct Wanted {
     weight: f32,
     /// Parts, if there is an edge in it.
     parts: u32,
-    /// Whose light differs, by how much that may differ from one that runs evenly, and what the element has of it.
-    strands: Vec<(usize, f32, Bands)>,
+    /// Whose light differs, and by how much that may differ from one that runs evenly.
+    strands: Vec<(usize, f32)>,
+}
+
+/// A search for all edges in some light.
+struct Search {
+    revision: u64,
+    wanted: Vec<Wanted>,
+    /// Samples that are not there yet.
+    missing: Vec<Sample>,
+}
+
+/// The light of a strand on an element.
+#[derive(Clone)]
+struct Found {
+    /// What is shown at the corners.
+    corners: [Bands; 3],
+    /// By how much places have more than is shown.
+    more: Vec<Bands>,
 }
 
 /// An element that is cut.
 struct Cut {
     parts: u32,
-    /// Of each strand by how much places have another light than is shown there, and what the element had of it then.
-    differences: Vec<(usize, Vec<Bands>, Bands)>,
+    strands: Vec<(usize, Found)>,
 }
 
 /// What is known of edges.
@@ -81,10 +108,9 @@ pub struct Edges {
     cuts: BTreeMap<Key, Cut>,
     /// Whether lamps or what stands in their light have changed since.
     is_old: bool,
-    /// What is to be known next, and of which light.
-    wanted: Option<(u64, Vec<Wanted>)>,
+    search: Option<Search>,
     /// What was found as the lamps and what stands in their light are now.
-    samples: BTreeMap<Sample, Vec<Bands>>,
+    samples: BTreeMap<Sample, Found>,
 }
 
 /// How many places an element of so many parts has.
@@ -116,8 +142,8 @@ fn between(parts: u32, known: &[Bands], [v, w]: [f32; 2]) -> Bands {
 }
 
 /// What the corners of an element have.
-fn corners(parts: u32, known: &[Bands]) -> Vec<Bands> {
-    vec![known[0], known[parts as usize], known[known.len() - 1]]
+fn corners(parts: u32, known: &[Bands]) -> [Bands; 3] {
+    [known[0], known[parts as usize], known[known.len() - 1]]
 }
 
 /// Whether places have about what would run evenly between the corners.
@@ -128,24 +154,24 @@ fn is_even(parts: u32, known: &[Bands], tolerance: f32) -> bool {
 }
 
 impl Edges {
-    /// Of elements that are wanted, samples that are not there yet.
+    /// Of elements that are wanted, samples that are not there yet: those of an object together.
     fn missing(&self, wanted: &[Wanted]) -> Vec<Sample> {
         let of = |wanted: &Wanted| -> Vec<Sample> {
             let parts = if self.has_edge(wanted) { wanted.parts } else { wanted.parts.min(PROBE) };
-            wanted.strands.iter().map(|(strand, ..)| (wanted.key, *strand, parts)).collect()
+            wanted.strands.iter().map(|(strand, _)| (wanted.key, *strand, parts)).collect()
         };
         let mut missing: Vec<Sample> =
             wanted.iter().flat_map(of).filter(|key| !self.samples.contains_key(key)).collect();
-        missing.sort_unstable_by_key(|((object, element), strand, parts)| (*object, *strand, *element, *parts));
+        missing.sort_unstable();
         missing
     }
 
     /// Whether what was found first on an element is not even.
     fn has_edge(&self, Wanted { key, parts, strands, .. }: &Wanted) -> bool {
         let probe = (*parts).min(PROBE);
-        strands.iter().any(|(strand, tolerance, _)| {
+        strands.iter().any(|(strand, tolerance)| {
             let found = self.samples.get(&(*key, *strand, probe));
-            found.is_some_and(|found| !is_even(probe, found, *tolerance))
+            found.is_some_and(|found| !is_even(probe, &found.more, *tolerance))
         })
     }
 
@@ -160,11 +186,12 @@ impl Edges {
             if count > most {
                 break;
             }
-            let of = |(strand, _, light): &(usize, f32, Bands)| {
+            let of = |(strand, _): &(usize, f32)| {
                 let found = self.samples.get(&(one.key, *strand, from))?;
-                Some((*strand, if has_edge { found.clone() } else { corners(from, found) }, *light))
+                let more = if has_edge { found.more.clone() } else { corners(from, &found.more).to_vec() };
+                Some((*strand, Found { more, ..*found }))
             };
-            cuts.insert(one.key, Cut { parts, differences: one.strands.iter().filter_map(of).collect() });
+            cuts.insert(one.key, Cut { parts, strands: one.strands.iter().filter_map(of).collect() });
         }
         cuts
     }
@@ -176,7 +203,7 @@ impl Session {
         self.most_places == 0 || self.edges.revision == Some(self.state.revision)
     }
 
-    /// Lamps or what stands in their light have changed. Elements stay cut that have the same light of them as before.
+    /// Lamps or what stands in their light have changed. Elements stay cut that have the same light of them at their corners.
     pub(super) fn doubt(&mut self) {
         let cuts = std::mem::take(&mut self.edges.cuts);
         self.edges = Edges { cuts, is_old: true, ..Edges::default() };
@@ -188,46 +215,52 @@ impl Session {
         cuts.filter(move |(element, cut)| self.is_as_it_was((object, *element), cut))
     }
 
-    fn is_as_it_was(&self, (object, element): Key, cut: &Cut) -> bool {
-        let has = |(strand, _, light): &(usize, _, Bands)| self.of_column(object, *strand)(element).0 == *light;
-        !self.edges.is_old || cut.differences.iter().all(has)
+    fn is_as_it_was(&self, key: Key, cut: &Cut) -> bool {
+        !self.edges.is_old || cut.strands.iter().all(|(strand, found)| self.corners(key, *strand) == found.corners)
     }
 
     /// Looks for edges until a time, at least for some.
     pub(super) fn sharpen(&mut self, deadline: Instant) {
         let revision = self.state.revision;
-        let known = self.edges.wanted.take().filter(|(of, _)| *of == revision);
-        let wanted = known.map_or_else(|| self.edges_in_sight(), |(_, wanted)| wanted);
-        let missing = self.edges.missing(&wanted);
-        for group in missing.chunk_by(|a, b| (a.0.0, a.1) == (b.0.0, b.1)) {
-            let ((object, _), strand, _) = group[0];
-            let shown = self.shown_of(object, strand);
-            for some in group.chunks(BATCH) {
-                let found: Vec<_> = some.par_iter().map(|sample| (*sample, self.sample(*sample, &shown))).collect();
-                self.edges.samples.extend(found);
-                if Instant::now() >= deadline {
-                    self.edges.wanted = Some((revision, wanted));
-                    return;
-                }
+        let mut search = match self.edges.search.take().filter(|search| search.revision == revision) {
+            Some(search) => search,
+            None => {
+                let wanted = self.edges_in_sight();
+                Search { revision, missing: self.edges.missing(&wanted), wanted }
+            }
+        };
+        if search.missing.is_empty() {
+            // What has an edge is cut further.
+            search.missing = self.edges.missing(&search.wanted);
+        }
+        if search.missing.is_empty() {
+            return self.cut(&search);
+        }
+        loop {
+            let some = search.missing.split_off(search.missing.len().saturating_sub(BATCH));
+            let found: Vec<_> = some.into_par_iter().map(|sample| (sample, self.sample(sample))).collect();
+            self.edges.samples.extend(found);
+            if search.missing.is_empty() || Instant::now() >= deadline {
+                break;
             }
         }
-        if !missing.is_empty() {
-            // What has an edge is cut further.
-            self.edges.wanted = Some((revision, wanted));
-            return;
-        }
-        let cuts = self.edges.cut(&wanted, self.most_places);
-        let there: BTreeSet<Key> = wanted.iter().map(|wanted| wanted.key).collect();
+        self.edges.search = Some(search);
+    }
+
+    /// All that is wanted is known.
+    fn cut(&mut self, search: &Search) {
+        let cuts = self.edges.cut(&search.wanted, self.most_places);
+        let there: BTreeSet<Key> = search.wanted.iter().map(|wanted| wanted.key).collect();
         self.edges.samples.retain(|(key, ..), _| there.contains(key));
         let before = std::mem::replace(&mut self.edges.cuts, cuts);
         self.state.changed.extend(before.keys().chain(self.edges.cuts.keys()).map(|key| key.0));
-        (self.edges.revision, self.edges.is_old) = (Some(revision), false);
+        (self.edges.revision, self.edges.is_old) = (Some(search.revision), false);
     }
 
-    /// The light of a strand at the vertices of an object, as it is shown where it is not dimmed.
-    fn shown_of(&self, object: usize, strand: usize) -> Vec<Bands> {
+    /// What a strand brings directly to the corners of an element, as it is shown where it is not dimmed.
+    fn corners(&self, (object, element): Key, strand: usize) -> [Bands; 3] {
         let (light, is_buried) = (self.of_column(object, strand), self.buried(object));
-        self.display(object).light(|element| Light { lamps: light(element).0, rest: [0.0; 3] }, None, is_buried)
+        self.display(object).corners(element, |element| (!is_buried(element)).then(|| light(element).0))
     }
 
     /// What a strand brings directly to the elements of an object, and the share of shadow rays that came through.
@@ -265,11 +298,11 @@ impl Session {
         if !body.is_present || self.objects[object].paint.transmits {
             return Vec::new();
         }
+        let display = self.display(object);
         for (strand, factor) in strands {
             let light = self.of_column(object, *strand);
             let light: Vec<(Bands, f32)> = (0..body.elements()).map(light).collect();
-            let ranges =
-                self.display(object).ranges(|element| luminance(light[element as usize].0), self.buried(object));
+            let ranges = display.ranges(|element| luminance(light[element as usize].0), self.buried(object));
             for (element, [low, high]) in (0..).zip(ranges) {
                 // A shadow narrower than elements makes no difference among them.
                 let (own, share) = light[element as usize];
@@ -278,7 +311,7 @@ impl Session {
                 let all = self.state.shown[(body.first + element) as usize].0;
                 let all = luminance([all[0], all[1], all[2]]).max(factor * high);
                 let contrast = if all > 0.0 { factor * (high - low) / all } else { 0.0 };
-                if contrast < LEAST_CONTRAST {
+                if contrast < LEAST_CONTRAST || !display.is_flat(element) {
                     continue;
                 }
                 let width = (2.0 * body.area(element)).sqrt();
@@ -286,38 +319,40 @@ impl Session {
                 let key = (object, element);
                 let one = found.entry(key).or_insert(Wanted { key, weight: 0.0, parts, strands: Vec::new() });
                 one.weight = one.weight.max(contrast * (width as f32).sqrt());
-                one.parts = one.parts.max(parts);
-                one.strands.push((*strand, EVEN * all / factor, own));
+                one.strands.push((*strand, EVEN * all / factor));
             }
         }
         found.into_values().collect()
     }
 
-    /// By how much the places of an element have another light of a strand than is shown there.
-    fn sample(&self, ((object, element), strand, parts): Sample, shown: &[Bands]) -> Vec<Bands> {
-        let Some(column) = self.strands[strand].column else { return vec![[0.0; 3]; places_of(parts)] };
+    /// The light of a strand at the places of an element.
+    fn sample(&self, (key, strand, parts): Sample) -> Found {
+        let corners = self.corners(key, strand);
+        let Some(column) = self.strands[strand].column else {
+            return Found { corners, more: vec![[0.0; 3]; places_of(parts)] };
+        };
         let world = self.live.world();
-        let (body, display) = (&world.bodies[object], self.display(object));
+        let (body, display) = (&world.bodies[key.0], self.display(key.0));
         let turned = DMat3::from_mat4(DMat4::from(body.matrix)).inverse().transpose();
         let found = |[v, w]: [f32; 2]| {
             let inwards = |x: f32| x + INWARDS * (1.0 / 3.0 - x);
-            let (t, side, at) = body.point(element, [inwards(v), inwards(w)]);
+            let (t, side, at) = body.point(key.1, [inwards(v), inwards(w)]);
             let flat = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
-            let smooth = (turned * display.normal(element, [v, w])).normalize_or_zero();
+            let smooth = (turned * display.normal(key.1, [v, w])).normalize_or_zero();
             let normal = if smooth.dot(flat) > 0.0 { smooth } else { flat };
             self.live.receive_from(column, (at + world.middle, normal))
         };
-        let difference = |[v, w]: [f32; 2]| {
+        let more = |[v, w]: [f32; 2]| {
             let mut sum = [0f32; 3];
-            for [x, y] in AROUND {
+            for [x, y] in FOOTPRINT {
                 let [x, y] = [v + x / parts as f32, w + y / parts as f32].map(|x| x.max(0.0));
                 let found = found([x, y].map(|k| k / (x + y).max(1.0)));
-                (0..3).for_each(|band| sum[band] += found[band] / AROUND.len() as f32);
+                (0..3).for_each(|band| sum[band] += found[band] / FOOTPRINT.len() as f32);
             }
-            let shown = display.at(shown, element, [v, w]);
+            let shown = between(1, &corners, [v, w]);
             std::array::from_fn(|band| sum[band] - shown[band])
         };
-        places(parts).map(difference).collect()
+        Found { corners, more: places(parts).map(more).collect() }
     }
 
     /// Elements of an object that are cut where light has an edge, and into how many parts along each side.
@@ -337,15 +372,14 @@ impl Session {
             Layer::Light(_) => own == Some(strand),
             Layer::Indirect | Layer::Error | Layer::RelativeError => false,
         };
-        let display = self.display(object.0 as usize);
         let mut all: Vec<Bands> = Vec::new();
         for (element, cut) in self.cuts_of(object.0 as usize) {
-            let first = all.len();
+            let (first, display) = (all.len(), self.display(object.0 as usize));
             all.extend(places(cut.parts).map(|uv| display.at(light, element, uv)));
-            for (strand, differences, _) in cut.differences.iter().filter(|(strand, ..)| is_in(*strand)) {
+            for (strand, Found { more, .. }) in cut.strands.iter().filter(|(strand, _)| is_in(*strand)) {
                 let factor = self.state.factors.get(*strand).copied().unwrap_or_default();
-                for (light, difference) in all[first..].iter_mut().zip(differences) {
-                    (0..3).for_each(|band| light[band] += factor[band] * difference[band]);
+                for (light, more) in all[first..].iter_mut().zip(more) {
+                    (0..3).for_each(|band| light[band] += factor[band] * more[band]);
                 }
             }
             all[first..].iter_mut().flatten().for_each(|x| *x = x.max(0.0));
@@ -358,9 +392,9 @@ impl Session {
         let mut shown = self.display(object).at(light, element, uv);
         let key = (object, element);
         if let Some(cut) = self.edges.cuts.get(&key).filter(|cut| self.is_as_it_was(key, cut)) {
-            for (strand, differences, _) in &cut.differences {
+            for (strand, Found { more, .. }) in &cut.strands {
                 let factor = self.state.factors.get(*strand).copied().unwrap_or_default();
-                let more = between(cut.parts, differences, uv);
+                let more = between(cut.parts, more, uv);
                 (0..3).for_each(|band| shown[band] += factor[band] * more[band]);
             }
         }
@@ -382,10 +416,18 @@ impl Display {
         self.indices.chunks_exact(3).map(of).map(|[low, high]| [low.min(high), high]).collect()
     }
 
+    /// Whether an element is flat to the eye, too, and no facet of a rounded body.
+    fn is_flat(&self, element: u32) -> bool {
+        let corners = &self.indices[3 * element as usize..][..3];
+        let [a, b, c] = [0, 1, 2].map(|k| Vec3::from(self.positions[corners[k] as usize]));
+        let flat = (b - a).cross(c - a).normalize_or_zero();
+        corners.iter().all(|corner| Vec3::from(self.normals[*corner as usize]).dot(flat) >= FLAT)
+    }
+
     /// The normal at a place of an element, of any length.
     pub fn normal(&self, element: u32, [v, w]: [f32; 2]) -> DVec3 {
         let corners = &self.indices[3 * element as usize..][..3];
-        let [a, b, c] = [0, 1, 2].map(|k| glam::Vec3::from(self.normals[corners[k] as usize]));
+        let [a, b, c] = [0, 1, 2].map(|k| Vec3::from(self.normals[corners[k] as usize]));
         ((1.0 - v - w) * a + v * b + w * c).as_dvec3()
     }
 }

@@ -205,8 +205,8 @@ impl Session {
         if rays == 0 {
             return None;
         }
-        let mut known = self.weights.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some((_, weights)) = known.get(&object).filter(|(of, _)| *of == revision) {
+        let lock = || self.weights.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, weights)) = lock().get(&object).filter(|(of, _)| *of == revision) {
             return Some(weights.clone());
         }
         let of = |list: &[Lanes<4>], element: u32| list.get(first + element as usize).map_or(0.0, luminance_of);
@@ -214,7 +214,7 @@ impl Session {
         // As of rays of which one in two finds light; rarer light is noisier and stays so.
         let noise = 1.0 / (rays as f32).sqrt();
         let weights = Arc::new(self.display(object).weights(guide, noise, is_buried));
-        known.insert(object, (revision, weights.clone()));
+        lock().insert(object, (revision, weights.clone()));
         Some(weights)
     }
 
@@ -254,23 +254,26 @@ impl Session {
         layer == Layer::Total || !self.state.is_edited || cache.iter().any(is_kept)
     }
 
-    /// A layer by id, if it can be told. The last ones are kept, as they are asked for object by object.
+    /// A layer by id, if it can be told. The last ones are kept, as they are asked for object by object. Nothing is found under a lock:
+    /// who waits for the other threads may be handed a task that asks for the same.
     fn layer(&self, layer: Layer) -> Option<Kept> {
         if !self.has_layer(layer) {
             return None;
         }
-        let mut cache = self.cache.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let revision = self.state.revision;
-        cache.retain(|kept| kept.revision == revision);
-        let kept = match cache.iter().position(|kept| kept.layer == layer) {
-            Some(place) => cache.remove(place),
-            None => Kept {
-                layer,
-                revision,
-                values: Arc::new(self.find_layer(layer, &cache)),
-                lamps: Arc::new(self.lamps_of(layer)),
-            },
+        let lock = || self.cache.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let known: Vec<Kept> = {
+            let mut cache = lock();
+            cache.retain(|kept| kept.revision == revision);
+            cache.clone()
         };
+        if let Some(kept) = known.iter().find(|kept| kept.layer == layer) {
+            return Some(kept.clone());
+        }
+        let values = Arc::new(self.find_layer(layer, &known));
+        let kept = Kept { layer, revision, values, lamps: Arc::new(self.lamps_of(layer)) };
+        let mut cache = lock();
+        cache.retain(|kept| kept.layer != layer);
         if cache.len() == MOST_KEPT {
             cache.remove(0);
         }

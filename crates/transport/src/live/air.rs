@@ -83,7 +83,7 @@ impl Live {
         Arrival { found, direct: direct.collect() }
     }
 
-    /// Whether a column has lamps, and none of them has an area: each shadow ray from a point finds the same.
+    /// Whether a column has one lamp, and that without area: each shadow ray from a point finds the same.
     pub fn is_certain(&self, column: usize) -> bool {
         !self.columns[column].is_empty() && self.columns[column].is_certain()
     }
