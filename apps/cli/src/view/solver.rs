@@ -586,6 +586,74 @@ mod tests {
         assert!(!is_lit(&mut solver, block), "it is dark");
     }
 
+    /// How objects are cut and the light of their cuts bear the same number in all layers, before and after an edit, and a page that
+    /// comes later is sent no more of it than there is.
+    #[test]
+    fn cuts_and_their_light_bear_a_number() {
+        let mut scene = radiosity::cornell_box();
+        scene.lights.push(radiosity::PointLight {
+            name: "lamp".to_owned(),
+            kind: radiosity::PointLightKind::Point,
+            position: glam::DVec3::new(0.3, 0.5, 0.1),
+            direction: glam::DVec3::NEG_Y,
+            intensity: [100.0; 3],
+            range: None,
+        });
+        let options = SessionOptions { elements: 600, rays: 16, places: 5000, ..SessionOptions::default() };
+        let board = Arc::new(Board::new());
+        let layers = [Layer::Total, Layer::Indirect];
+        layers.iter().for_each(|layer| board.watch(*layer));
+        let mut solver = Solver::new(Session::new(scene, &options).unwrap(), None, board.clone());
+        let words = |bytes: &[u8]| -> Vec<u32> {
+            bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
+        };
+        let mut most = 0;
+        for shift in [0.0, 0.05] {
+            let block = solver.model.objects.iter().find(|object| object.name.contains("block")).unwrap().id;
+            let matrix = glam::DMat4::from_translation(glam::DVec3::X * shift).to_cols_array();
+            let (answer, _answers) = mpsc::channel(1);
+            let edit = Edit::Move { object: block, matrix };
+            assert!(solver.take(Command::Ask { page: 0, request: Request::Edit { edit, gesture: None }, answer }));
+            solver.turn();
+            while !solver.is_done {
+                solver.turn();
+            }
+            let mut seen = Seen::default();
+            let notices: Vec<_> = std::iter::from_fn(|| board.next_notice(&mut seen)).collect();
+            let cuts: Vec<Vec<u32>> = notices
+                .iter()
+                .filter_map(|notice| match notice {
+                    super::super::board::Notice::Binary(bytes) => Some(words(bytes)).filter(|words| words[0] == 3),
+                    super::super::board::Notice::Text(_) => None,
+                })
+                .collect();
+            assert!(cuts.iter().any(|cuts| cuts.len() > 3), "{cuts:?}");
+            for layer in layers {
+                let mut seen = Seen::default();
+                let frames = std::iter::from_fn(|| Some(board.next_light(layer, &mut seen)));
+                let chunks: Vec<_> = frames.take_while(|chunks| !chunks.is_empty()).flatten().collect();
+                for cuts in &cuts {
+                    let (object, number) = (cuts[1], cuts[2]);
+                    most = most.max(number);
+                    let own = chunks.iter().filter(|chunk| chunk.object == object);
+                    let values: BTreeMap<u32, u16> = own
+                        .flat_map(|chunk| {
+                            chunk.values.iter().enumerate().map(|(k, x)| (3 * chunk.first + k as u32, *x))
+                        })
+                        .collect();
+                    let vertices = solver.model.objects[object as usize].positions.len() as u32;
+                    let places: u32 = cuts[3..].chunks(2).map(|cut| (cut[1] + 1) * (cut[1] + 2) / 2).sum();
+                    let whole = if places > 0 { vertices + 1 + places } else { vertices };
+                    assert_eq!(values.len() as u32, 3 * whole, "{layer:?} of object {object}");
+                    if places > 0 {
+                        assert_eq!(u32::from(values[&(3 * vertices)]), number, "{layer:?} of object {object}");
+                    }
+                }
+            }
+        }
+        assert!(most > 1, "what was cut has changed");
+    }
+
     /// A page that has not read other answers gets its plane when it has; meanwhile other pages get theirs.
     #[test]
     fn a_plane_waits_until_its_page_reads() {

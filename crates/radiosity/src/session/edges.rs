@@ -7,8 +7,8 @@
 //! is that of whole elements still.
 //!
 //! Left out are lamps with area, whose edges are softer, and of which few rays tell less than what is shown: with 32 at a place the walls of
-//! an office with twelve panels became mottled; lights that share a column; and facets of rounded bodies, on which the shadow that these
-//! cast on themselves would show.
+//! an office with twelve panels became mottled; lights that share a column; and facets of rounded bodies that the lamp grazes, on which
+//! the shadow that these cast on themselves would show.
 //!
 //! Kept is by how much the places differ from what is shown there, for a lamp that is not dimmed: it can be added to every layer
 //! that has light of this lamp, in whatever light the lamp is now, and stays when lamps are dimmed and walls painted. Where it runs
@@ -60,6 +60,10 @@ const INWARDS: f32 = 1e-3;
 
 /// Least cosine between the normals of a facet and of its corners, 3°: beyond, a body is rounded.
 const FLAT: f32 = 0.9986;
+
+/// Least cosine at which a lamp shines on facets of rounded bodies that are cut. The next facet, turned by 17° at most where bodies look
+/// round, is in the light then, too.
+const GRAZING: f64 = 0.3;
 
 /// An element of an object.
 type Key = (usize, u32);
@@ -311,7 +315,7 @@ impl Session {
                 let all = self.state.shown[(body.first + element) as usize].0;
                 let all = luminance([all[0], all[1], all[2]]).max(factor * high);
                 let contrast = if all > 0.0 { factor * (high - low) / all } else { 0.0 };
-                if contrast < LEAST_CONTRAST || !display.is_flat(element) {
+                if contrast < LEAST_CONTRAST || !display.is_flat(element) && self.grazes(*strand, (object, element)) {
                     continue;
                 }
                 let width = (2.0 * body.area(element)).sqrt();
@@ -323,6 +327,16 @@ impl Session {
             }
         }
         found.into_values().collect()
+    }
+
+    /// Whether a strand's lamp shines on an element at a small angle, or from behind.
+    fn grazes(&self, strand: usize, (object, element): Key) -> bool {
+        let world = self.live.world();
+        let body = &world.bodies[object];
+        let (t, side, at) = body.point(element, [1.0 / 3.0; 2]);
+        let flat = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
+        let cosine = |column| self.live.cosine_from(column, (at + world.middle, flat));
+        self.strands[strand].column.is_none_or(|column| cosine(column) < GRAZING)
     }
 
     /// The light of a strand at the places of an element.

@@ -88,6 +88,14 @@ impl Live {
         !self.columns[column].is_empty() && self.columns[column].is_certain()
     }
 
+    /// The cosine at which the lamp of a column that is certain shines on a point of the world with a unit normal; 0 from behind.
+    pub fn cosine_from(&self, column: usize, (point, normal): (DVec3, DVec3)) -> f64 {
+        let column = &self.columns[column];
+        let site = Site::in_the_air(point - self.world.middle, normal);
+        let sample = column.sample(&self.world, &site, (0, &column.sequence(0)), 0);
+        sample.map_or(0.0, |sample| sample.ray.direction.as_dvec3().dot(normal).max(0.0))
+    }
+
     /// What a column that is certain brings straight to a point of the world with a unit normal, lux per band.
     pub fn receive_from(&self, column: usize, (point, normal): (DVec3, DVec3)) -> Bands {
         let site = Site::in_the_air(point - self.world.middle, normal);
