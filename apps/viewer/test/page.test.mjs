@@ -163,6 +163,7 @@ test('points of a grid beneath things are left out and counted', async () => {
     assert.equal(isCovered, isUnder, `${x} ${z}`);
   }
   await page.keyboard.press('Control+z');
+  await done(page, edits + 4);
   await page.waitForFunction((covered) => window.radiosity.state().grid.covered === covered, laid.covered);
   // The lid of a block that stands askew: rows run along its sides.
   const lid = await page.evaluate(() => {
