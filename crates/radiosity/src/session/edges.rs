@@ -213,14 +213,22 @@ impl Session {
         self.edges = Edges { cuts, is_old: true, ..Edges::default() };
     }
 
-    /// The elements of an object that are cut.
-    fn cuts_of(&self, object: usize) -> impl Iterator<Item = (u32, &Cut)> {
-        let cuts = self.edges.cuts.range((object, 0)..(object + 1, 0)).map(|((_, element), cut)| (*element, cut));
-        cuts.filter(move |(element, cut)| self.is_as_it_was((object, *element), cut))
+    /// The first light after that is there.
+    pub(super) fn keep_cuts(&mut self) {
+        if !std::mem::take(&mut self.edges.is_old) {
+            return;
+        }
+        let cuts = std::mem::take(&mut self.edges.cuts);
+        let is_as_it_was = |(key, cut): &(Key, Cut)| {
+            let is_there = self.live.world().bodies[key.0].is_present;
+            is_there && cut.strands.iter().all(|(strand, found)| self.corners(*key, *strand) == found.corners)
+        };
+        self.edges.cuts = cuts.into_par_iter().filter(is_as_it_was).collect();
     }
 
-    fn is_as_it_was(&self, key: Key, cut: &Cut) -> bool {
-        !self.edges.is_old || cut.strands.iter().all(|(strand, found)| self.corners(key, *strand) == found.corners)
+    /// The elements of an object that are cut.
+    fn cuts_of(&self, object: usize) -> impl Iterator<Item = (u32, &Cut)> {
+        self.edges.cuts.range((object, 0)..(object + 1, 0)).map(|((_, element), cut)| (*element, cut))
     }
 
     /// Looks for edges until a time, at least for some.
@@ -404,8 +412,7 @@ impl Session {
     /// All light as it is shown at a place of an element, given that at the vertices.
     pub(super) fn shown_at(&self, object: usize, light: &[Bands], element: u32, uv: [f32; 2]) -> Bands {
         let mut shown = self.display(object).at(light, element, uv);
-        let key = (object, element);
-        if let Some(cut) = self.edges.cuts.get(&key).filter(|cut| self.is_as_it_was(key, cut)) {
+        if let Some(cut) = self.edges.cuts.get(&(object, element)) {
             for (strand, Found { more, .. }) in &cut.strands {
                 let factor = self.state.factors.get(*strand).copied().unwrap_or_default();
                 let more = between(cut.parts, more, uv);

@@ -367,6 +367,9 @@ impl Session {
         while !self.is_done() {
             let was_edited = self.state.is_edited;
             self.piece(deadline);
+            if was_edited && !self.state.is_edited {
+                self.keep_cuts();
+            }
             // The light of an edit is wanted at once.
             if was_edited && !self.state.is_edited || Instant::now() >= deadline {
                 break;
