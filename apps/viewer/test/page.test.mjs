@@ -585,6 +585,23 @@ test('what is not as it was asked for is told until the next number, and is not 
   await page.context().close();
 });
 
+test('what is written into a number that changed under the cursor replaces it', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const exposure = page.getByRole('spinbutton', { name: 'Exposure, EV' });
+  await exposure.focus();
+  await page.keyboard.press('Control+a');
+  await page.evaluate(() => window.radiosity.app.exposure.set(-7.25));
+  await page.keyboard.insertText('-5');
+  assert.equal(await exposure.inputValue(), '-5');
+  // What is being written stays.
+  await page.evaluate(() => window.radiosity.app.exposure.set(-7.5));
+  assert.equal(await exposure.inputValue(), '-5');
+  await page.keyboard.press('Enter');
+  assert.equal(await page.evaluate(() => window.radiosity.app.exposure.value), -5);
+  await page.context().close();
+});
+
 test('a decimal comma is a point, typed and pasted, and arrows go on from it', async () => {
   const page = await pages.open(program.url);
   await done(page);

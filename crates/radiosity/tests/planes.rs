@@ -1,8 +1,11 @@
 //! Measuring grids in the air: against closed forms, a furnace and `measure`, and after edits.
 
+#[path = "common/finish.rs"]
+mod finish;
 #[path = "common/room.rs"]
 mod room;
 
+use finish::finish;
 use glam::{DMat4, DVec3};
 use radiosity::session::{
     Edit, LightId, ObjectId, Plane, PlaneError, PlaneQuestion, PlaneReading, Session, SessionOptions,
@@ -18,15 +21,6 @@ fn lit(scene: Scene, elements: usize) -> Session {
     let mut session = Session::new(scene, &options).unwrap();
     finish(&mut session);
     session
-}
-
-fn finish(session: &mut Session) {
-    for _ in 0..100_000 {
-        if session.step(Duration::from_millis(3)).is_done {
-            return;
-        }
-    }
-    panic!("{:?}", session.status());
 }
 
 /// Over the first triangle of an object.

@@ -1,8 +1,11 @@
 //! Light measured at places on surfaces: against closed forms, and what it says of the picture.
 
+#[path = "common/finish.rs"]
+mod finish;
 #[path = "common/room.rs"]
 mod room;
 
+use finish::finish;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 use radiosity::session::{
     Edit, Layer, LightId, NewLight, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed,
@@ -11,15 +14,6 @@ use radiosity::{Material, PointLight, PointLightKind, Scene};
 use rayon::prelude::*;
 use room::{Furnishing, room};
 use std::time::Duration;
-
-fn finish(session: &mut Session) {
-    for _ in 0..100_000 {
-        if session.step(Duration::from_millis(3)).is_done {
-            return;
-        }
-    }
-    panic!("{:?}", session.status());
-}
 
 /// Measured in as many slices as it takes.
 fn read(session: &Session, places: Vec<SurfacePlace>) -> Surveyed {

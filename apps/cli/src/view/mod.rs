@@ -69,9 +69,8 @@ pub struct Arguments {
 /// Commands that wait for the solver.
 const WAITING: usize = 256;
 
-/// Most places at which light is found where it has an edge within elements: pages draw two triangles for each, and six bytes come with
-/// every change of it. Half as many leave tables in the sun without their edges; twice as many take pages without graphics hardware
-/// twice the time for a picture.
+/// Most places at which light is found where it has an edge within elements: pages draw up to two triangles for each, and six bytes
+/// come with every change of it. A furnished room in the sun with a garden takes all of them.
 const PLACES: usize = 150_000;
 
 /// How long open connections have to end.

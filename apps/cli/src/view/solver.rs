@@ -522,7 +522,8 @@ fn not_kept(why: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::board::Seen;
+    use super::super::board::{Notice, Seen};
+    use super::super::wire::CUTS;
     use super::*;
     use radiosity::session::{PlaneQuestion, SessionOptions};
 
@@ -623,8 +624,8 @@ mod tests {
             let cuts: Vec<Vec<u32>> = notices
                 .iter()
                 .filter_map(|notice| match notice {
-                    super::super::board::Notice::Binary(bytes) => Some(words(bytes)).filter(|words| words[0] == 3),
-                    super::super::board::Notice::Text(_) => None,
+                    Notice::Binary(bytes) => Some(words(bytes)).filter(|words| words[0] == CUTS),
+                    Notice::Text(_) => None,
                 })
                 .collect();
             assert!(cuts.iter().any(|cuts| cuts.len() > 3), "{cuts:?}");

@@ -28,7 +28,7 @@ const UNIT: f32 = 16.0;
 
 const MESH: u32 = 1;
 const LIGHT: u32 = 2;
-const CUTS: u32 = 3;
+pub const CUTS: u32 = 3;
 const HAS_UVS: u32 = 1;
 const HAS_COLOURS: u32 = 2;
 

@@ -4,7 +4,7 @@ import { LAMPS, type LampKind } from '../lamps';
 import { luminance } from '../luminance';
 import { readable } from '../scale';
 import type { LightNotice } from '../wire';
-import { button, el, hex, isOpen, linear, section, slider } from './parts';
+import { button, el, fill, hex, linear, section, slider } from './parts';
 
 const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', directional: 'Parallel', sky: 'Sky' };
 
@@ -113,9 +113,9 @@ function row(app: App, id: number): Row {
       // What gives no light at all cannot be turned up.
       absolute.hidden = undimmed(now) <= 0;
       amount.max = String(MOST_DIMMING * undimmed(now));
-      if (!isOpen(amount)) amount.value = String(Number((now.dimming * undimmed(now)).toPrecision(4)));
+      fill(amount, String(Number((now.dimming * undimmed(now)).toPrecision(4))));
       const peak = Math.max(...now.colour, 1e-9);
-      if (!isOpen(colour)) colour.value = hex(now.colour.map((c) => c / peak));
+      fill(colour, hex(now.colour.map((c) => c / peak)));
     },
   };
 }

@@ -6,7 +6,7 @@ import { luminance } from '../luminance';
 import { lateness } from '../plane';
 import { coordinate, readable } from '../scale';
 import type { Share } from '../wire';
-import { button, el, fact, hex, isOpen, section } from './parts';
+import { button, el, fact, fill, hex, section } from './parts';
 import { layerName, unitOf } from './view';
 
 export function meterPanel(app: App): HTMLElement {
@@ -69,7 +69,7 @@ export function gridPanel(app: App): HTMLElement {
   app.on('grid', () => {
     const { grid, plane } = app.measuring;
     for (const [input, value] of [[height, app.measuring.planeHeight], [border, app.measuring.planeBorder]] as const) {
-      if (!isOpen(input)) input.value = String(value);
+      fill(input, String(value));
     }
     clear.hidden = !grid && !plane;
     warning.textContent = grid && app.layer !== 'total'

@@ -21,8 +21,16 @@ function shortcut(key?: string): string | undefined {
 }
 
 /** Whether a person is writing in a field: what is not yet said stays. */
-export function isOpen(input: HTMLInputElement): boolean {
+function isOpen(input: HTMLInputElement): boolean {
   return input.dataset.open !== undefined;
+}
+
+/** What stands in a field, unless a person is writing in it. Browsers put the cursor behind what is put there: in the field that a
+ *  person has entered, all of it is selected again, so that what is written next is not added to it. */
+export function fill(input: HTMLInputElement, text: string): void {
+  if (isOpen(input) || input.value === text) return;
+  input.value = text;
+  if (document.activeElement === input && input.type === 'number') input.select();
 }
 
 // A field is open from the first letter until it is said or left.
@@ -77,8 +85,8 @@ export function slider(
   const number = el('input', { type: 'number', step, 'aria-label': `${label}${unit ? `, ${unit}` : ''}`, change: () => give(number, true) });
   const set = (value: number) => {
     const text = String(Number(value.toFixed(2)));
-    if (!isOpen(number)) number.value = text;
-    if (!isOpen(range)) range.value = text;
+    fill(number, text);
+    fill(range, text);
     const share = (100 * (Math.min(max, Math.max(min, value)) - min)) / (max - min);
     range.style.setProperty('--share', `${share}%`);
   };

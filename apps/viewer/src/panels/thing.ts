@@ -6,7 +6,7 @@ import { turnOf } from '../gizmo';
 import { brighter, LAMPS, type LampKind, remade, solidAngle, sunOf } from '../lamps';
 import { luminance } from '../luminance';
 import { coordinate } from '../scale';
-import { button, choice, el, hex, isOpen, linear, section } from './parts';
+import { button, choice, el, fill, hex, linear, section } from './parts';
 
 /** As much as a surface may reflect: with 1 in a closed room light would never end. */
 const most = (reflectance: number[]) => reflectance.map((r) => Math.min(0.99, r));
@@ -177,35 +177,35 @@ export function thingPanel(app: App): HTMLElement {
     painting.hidden = !object;
     copying.hidden = !app.adding.isCopyable;
     if (object) {
-      if (!isOpen(paint)) paint.value = hex(object.reflectance);
-      if (!isOpen(reflectance)) reflectance.value = String(Math.round(1000 * luminance(object.reflectance)) / 10);
+      fill(paint, hex(object.reflectance));
+      fill(reflectance, String(Math.round(1000 * luminance(object.reflectance)) / 10));
     }
     standing.hidden = light?.type !== 'directional';
     if (!standing.hidden) {
       const now = sun();
-      for (const [angle, , input] of angles) if (!isOpen(input)) input.value = String(Number(((now[angle] * 180) / Math.PI).toFixed(1)));
+      for (const [angle, , input] of angles) fill(input, String(Number(((now[angle] * 180) / Math.PI).toFixed(1))));
     }
     const parts = app.adding.parts();
     const size = parts.length > 0 ? sizeOf(parts) : [];
     sizing.hidden = size.length === 0;
-    if (!sizing.hidden && !isOpen(tilt)) tilt.value = String(Math.round((1800 * app.adding.tilt()) / Math.PI) / 10 || 0);
+    if (!sizing.hidden) fill(tilt, String(Math.round((1800 * app.adding.tilt()) / Math.PI) / 10 || 0));
     lengths.forEach((input, k) => {
       input.parentElement!.hidden = k >= size.length;
-      if (!isOpen(input) && k < size.length) input.value = String(Number(size[k].toPrecision(4)));
+      if (k < size.length) fill(input, String(Number(size[k].toPrecision(4))));
     });
     lighting.hidden = !light?.intensity;
     if (light?.intensity) {
-      const put = (input: HTMLInputElement, value: number) => { if (!isOpen(input)) input.value = String(Number(value.toPrecision(4))); };
+      const write = (input: HTMLInputElement, value: number) => fill(input, String(Number(value.toPrecision(4))));
       const candela = luminance(light.intensity);
       kind.value = light.type;
-      put(intensity, candela);
-      put(flux, candela * solidAngle(light.cone));
+      write(intensity, candela);
+      write(flux, candela * solidAngle(light.cone));
       unit.textContent = light.type === 'directional' ? 'lx' : 'cd';
       intensity.setAttribute('aria-label', light.type === 'directional' ? 'Illuminance, lux' : 'Intensity, candela');
       // A spot that has no width has no lumens, either.
       fluxes.hidden = light.type === 'directional' || solidAngle(light.cone) === 0;
       cones.hidden = !light.cone;
-      light.cone?.forEach((angle, k) => put(cone[k], (angle * 180) / Math.PI));
+      light.cone?.forEach((angle, k) => write(cone[k], (angle * 180) / Math.PI));
     }
     const spot = app.spot();
     // Parallel light has no place.
@@ -214,9 +214,9 @@ export function thingPanel(app: App): HTMLElement {
     if (!spot) return;
     const at = app.stage.toScene(spot);
     places.forEach((input, k) => {
-      if (!isOpen(input)) input.value = coordinate(at.getComponent(k), 3);
+      fill(input, coordinate(at.getComponent(k), 3));
     });
-    if (!isOpen(turn)) turn.value = String(Math.round(10 * turnOf(placed.matrix, new Vector3(...(app.scene?.up ?? [0, 1, 0])))) / 10);
+    fill(turn, String(Math.round(10 * turnOf(placed.matrix, new Vector3(...(app.scene?.up ?? [0, 1, 0])))) / 10));
     mode.set(app.gizmo.mode);
   };
   app.on('selection', show);

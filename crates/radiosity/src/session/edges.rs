@@ -6,9 +6,9 @@
 //! (Cohen, Greenberg, Immel and Brock 1986, "An efficient radiosity approach for realistic image synthesis"): what surfaces give off
 //! is that of whole elements still.
 //!
-//! Left out are lamps with area, whose edges are softer, and of which few rays tell less than what is shown: with 32 at a place the walls of
-//! an office with twelve panels became mottled; lights that share a column; and facets of rounded bodies that the lamp grazes, on which
-//! the shadow that these cast on themselves would show.
+//! Left out are lamps with area, whose edges are softer, and of which few rays tell less than what is shown: with 8 to 32 at a place
+//! the walls of an office under panels became mottled; lights that share a column; sheets that light passes through; and facets of
+//! rounded bodies that the lamp grazes, on which the shadow that these cast on themselves would show.
 //!
 //! Kept is by how much the places differ from what is shown there, for a lamp that is not dimmed: it can be added to every layer
 //! that has light of this lamp, in whatever light the lamp is now, and stays when lamps are dimmed and walls painted. Where it runs
@@ -18,16 +18,16 @@
 use super::display::Display;
 use super::{Layer, ObjectId, Session, Strand};
 use glam::{DMat3, DMat4, DVec3, Vec3};
-use radiosity_scene::{Bands, Side, luminance};
+use radiosity_scene::{Bands, luminance};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-/// Parts of a side of elements as wide as they may be, in which there is an edge: two centimetres in a room of 60,000 elements. With
-/// twice as many, four times the places bring edges of half the width.
+/// Parts of a side of elements as wide as they may be, in which there is an edge. With 24 edges are finer, and take more than twice as
+/// many places: of as many as there may be, tables in the sun went without.
 const PARTS: u32 = 16;
 
-/// Parts by which it is seen whether there is an edge: with fewer, shadows of window bars fall between.
+/// Parts by which it is seen whether there is an edge; as each place looks around itself, next to nothing falls between.
 const PROBE: u32 = 6;
 
 /// Least difference among neighbours that is looked after, over the light there: half as much is hard to see beside the noise.
@@ -36,7 +36,7 @@ const LEAST_CONTRAST: f32 = 0.15;
 /// What light may differ by from one that runs evenly over an element, over the light there, before the element is cut.
 const EVEN: f32 = 0.05;
 
-/// How many times the places that may be in the end are looked at for edges: most elements beside one have none.
+/// How many times the places that may be in the end are wanted before it is known which elements have an edge: those beside it have none.
 const LOOKED_AT: usize = 4;
 
 /// Where around a place light is looked for, in widths of a part: two squares, turned and of different sizes, so that no two are in a row
@@ -52,7 +52,7 @@ const FOOTPRINT: [[f32; 2]; 8] = [
     [-0.1, 0.5],
 ];
 
-/// Elements between looks at the time: a millisecond's work.
+/// Elements between looks at the time.
 const BATCH: usize = 64;
 
 /// How far places at the border of an element are moved towards its middle: beside a wall they would be in it.
@@ -61,8 +61,8 @@ const INWARDS: f32 = 1e-3;
 /// Least cosine between the normals of a facet and of its corners, 3°: beyond, a body is rounded.
 const FLAT: f32 = 0.9986;
 
-/// Least cosine at which a lamp shines on facets of rounded bodies that are cut. The next facet, turned by 17° at most where bodies look
-/// round, is in the light then, too.
+/// Least cosine at which a lamp shines on facets of rounded bodies that are cut: next facets that are turned by up to 17° are in the
+/// light then, too.
 const GRAZING: f64 = 0.3;
 
 /// An element of an object.
@@ -117,13 +117,18 @@ pub struct Edges {
     samples: BTreeMap<Sample, Found>,
 }
 
+/// Bytes that so many places take, with what is looked at to find them.
+pub fn bytes(places: usize) -> usize {
+    (2 * LOOKED_AT + 1) * places * size_of::<Bands>()
+}
+
 /// How many places an element of so many parts has.
-pub fn places_of(parts: u32) -> usize {
+fn places_of(parts: u32) -> usize {
     ((parts + 1) * (parts + 2) / 2) as usize
 }
 
 /// Weights of the corners 1 and 2 of an element at its places, row by row.
-pub fn places(parts: u32) -> impl Iterator<Item = [f32; 2]> {
+fn places(parts: u32) -> impl Iterator<Item = [f32; 2]> {
     (0..=parts).flat_map(move |j| (0..=parts - j).map(move |i| [i, j].map(|k| k as f32 / parts as f32)))
 }
 
@@ -341,8 +346,7 @@ impl Session {
     fn grazes(&self, strand: usize, (object, element): Key) -> bool {
         let world = self.live.world();
         let body = &world.bodies[object];
-        let (t, side, at) = body.point(element, [1.0 / 3.0; 2]);
-        let flat = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
+        let (at, flat) = body.facing(element, [1.0 / 3.0; 2]);
         let cosine = |column| self.live.cosine_from(column, (at + world.middle, flat));
         self.strands[strand].column.is_none_or(|column| cosine(column) < GRAZING)
     }
@@ -358,8 +362,7 @@ impl Session {
         let turned = DMat3::from_mat4(DMat4::from(body.matrix)).inverse().transpose();
         let found = |[v, w]: [f32; 2]| {
             let inwards = |x: f32| x + INWARDS * (1.0 / 3.0 - x);
-            let (t, side, at) = body.point(key.1, [inwards(v), inwards(w)]);
-            let flat = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
+            let (at, flat) = body.facing(key.1, [inwards(v), inwards(w)]);
             let smooth = (turned * display.normal(key.1, [v, w])).normalize_or_zero();
             let normal = if smooth.dot(flat) > 0.0 { smooth } else { flat };
             self.live.receive_from(column, (at + world.middle, normal))
@@ -377,13 +380,14 @@ impl Session {
         Found { corners, more: places(parts).map(more).collect() }
     }
 
-    /// Elements of an object that are cut where light has an edge, and into how many parts along each side.
+    /// Elements of an object that are cut for display where light has an edge, and into how many parts along each side. None for an
+    /// object that there is not, and before the light is there.
     pub fn cuts(&self, object: ObjectId) -> Vec<(u32, u32)> {
         self.cuts_of(object.0 as usize).map(|(element, cut)| (element, cut.parts)).collect()
     }
 
     /// The light of a layer at the places of the elements that are cut ([`Session::cuts`]), given that at the vertices
-    /// ([`Session::light`]): with n parts, corner 1 counts i/n and corner 2 j/n, j from 0 to n and for each i from 0 to n − j.
+    /// ([`Session::light`]), in lux per band as that: with n parts, corner 1 counts i/n and corner 2 j/n, j from 0 to n and for each i from 0 to n − j.
     pub fn light_of_cuts(&self, object: ObjectId, layer: Layer, light: &[Bands]) -> Vec<Bands> {
         let own = match layer {
             Layer::Light(light) => self.light_of(light).map(|light| light.strand),

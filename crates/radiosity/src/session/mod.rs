@@ -235,9 +235,10 @@ impl Session {
         let shared = (MOST_SHADOWS as usize / lights.max(1)).max(1).next_power_of_two() as u32;
         let shadows = options.shadow_rays.unwrap_or(shared.max(LEAST_SHADOWS));
         let most = Target { rays, shadows: shadows.max(1).next_power_of_two().min(MOST_SHADOWS) };
-        let (needed, allowed) = (bytes(elements, rays, lights.min(MOST_COLUMNS)), options.memory);
+        let of_edges = edges::bytes(options.places);
+        let (needed, allowed) = (bytes(elements, rays, lights.min(MOST_COLUMNS)) + of_edges, options.memory);
         if needed > allowed {
-            let least = bytes(Live::count(&scene, f64::INFINITY), 4, lights.min(MOST_COLUMNS));
+            let least = bytes(Live::count(&scene, f64::INFINITY), 4, lights.min(MOST_COLUMNS)) + of_edges;
             return Err(Error::Memory { elements, rays: rays as usize, needed, allowed, least });
         }
 
@@ -397,7 +398,7 @@ impl Session {
             residual: self.state.residual,
             rays_traced: self.live.rays_traced(),
             seconds: self.state.seconds,
-            memory: bytes(self.live.ids(), most, self.strands.len()),
+            memory: bytes(self.live.ids(), most, self.strands.len()) + edges::bytes(self.most_places),
             is_solved: self.is_solved(),
             is_done: self.is_done(),
         }

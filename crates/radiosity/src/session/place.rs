@@ -30,15 +30,13 @@ impl Session {
         let of = |list: &[Lanes<4>], id: u32| -> Bands {
             list.get(id as usize).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]])
         };
+        let mut direct = Bands::default();
         let mut straight: BTreeMap<usize, Bands> = BTreeMap::new();
-        for ((column, factor), halves) in meter.columns.iter().zip(&arrival.direct) {
-            let light = straight.entry(*column).or_default();
-            (0..3).for_each(|band| light[band] = (0.5 * (halves[0][band] + halves[1][band])) as f32 * factor[band]);
+        for ((column, factor), [a, b]) in meter.columns.iter().zip(&arrival.direct) {
+            let light: Bands = std::array::from_fn(|band| (0.5 * (a[band] + b[band])) as f32 * factor[band]);
+            add(&mut direct, 1.0, light);
+            straight.insert(*column, light);
         }
-        let mut direct = straight.values().fold([0.0; 3], |mut sum, light| {
-            add(&mut sum, 1.0, *light);
-            sum
-        });
         let world = self.live.world();
         let emission = self.emission();
         let mut objects: BTreeMap<usize, Bands> = BTreeMap::new();
@@ -59,7 +57,7 @@ impl Session {
             for (id, share) in arrival.shares() {
                 add(&mut own, share, of(&emission, id));
                 if let Some(column) = column {
-                    let reflected = self.answer.answer(id, |id| column[id as usize]);
+                    let reflected = self.answer.reflected(id, |id| column[id as usize]);
                     add(&mut own, share, std::array::from_fn(|band| factor[band] * reflected[band]));
                 }
             }

@@ -49,7 +49,7 @@ impl Answer {
     }
 
     /// What an id makes of light, R H, given the irradiance of ids.
-    pub fn answer(&self, id: u32, h: impl Fn(u32) -> [f32; 3]) -> [f32; 3] {
+    pub fn reflected(&self, id: u32, h: impl Fn(u32) -> [f32; 3]) -> [f32; 3] {
         let (own, through) = (h(id), self.through(id, &h));
         std::array::from_fn(|band| self.rho[id as usize][band] * own[band] + through[band])
     }

@@ -7,7 +7,7 @@
 
 use super::{ObjectId, Session};
 use glam::{DMat4, DVec3};
-use radiosity_scene::{Bands, Side, luminance};
+use radiosity_scene::{Bands, luminance};
 use radiosity_transport::live::Target;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -118,8 +118,7 @@ impl Session {
         let body = world.bodies.get(place.object.0 as usize)?;
         let is_one = body.is_present && place.triangle < body.elements() && place.uv.iter().all(|x| x.is_finite());
         is_one.then(|| {
-            let (t, side, at) = body.point(place.triangle, place.uv);
-            let normal = if side == Side::Front { body.normals[t] } else { -body.normals[t] };
+            let (at, normal) = body.facing(place.triangle, place.uv);
             (at + world.middle, normal)
         })
     }

@@ -242,6 +242,16 @@ impl Body {
         (t, side, a + on.x * (b - a) + on.y * (c - a))
     }
 
+    /// That point, and the unit normal of its side.
+    pub fn facing(&self, element: u32, uv: [f32; 2]) -> (DVec3, DVec3) {
+        let (t, side, point) = self.point(element, uv);
+        (point, self.normal(t, side))
+    }
+
+    fn normal(&self, t: usize, side: Side) -> DVec3 {
+        if side == Side::Front { self.normals[t] } else { -self.normals[t] }
+    }
+
     /// Where a line of sight crosses the plane of an element, as [`Body::point`] takes it; none along the plane.
     pub fn towards(&self, element: u32, from: DVec3, direction: DVec3) -> Option<[f32; 2]> {
         let [a, b, c] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|uv| self.point(element, uv).2);
@@ -291,11 +301,10 @@ impl Body {
         let width = (b - a).cross(c - a).length().sqrt();
         let inset = (BORDER * offset / width).min(0.25);
         let centre = (a + b + c) / 3.0;
-        let normal = if side == Side::Front { self.normals[t] } else { -self.normals[t] };
         Site {
             origin: a + inset * (centre - a),
             edges: [b - a, c - a].map(|edge| (1.0 - inset) * edge),
-            normal,
+            normal: self.normal(t, side),
             centre,
             radius: a.distance(centre).max(b.distance(centre)).max(c.distance(centre)),
             triangle: self.first_triangle + t as u32,
