@@ -58,6 +58,7 @@ export class Stage {
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   readonly surfaces = new Map<number, Surface>();
   private batches = new Batches(this.root);
+  private cuts = new Cuts(this.batches);
   /** What is drawn over the scene and is no part of it. */
   readonly overlay = new Group();
   /** Things that stand in the overlay but not in the scene's axes. */
@@ -69,11 +70,6 @@ export class Stage {
   moves = 0;
   private dirty = true;
   private boxes = new Map<number, Box3>();
-  /** The elements that are cut, by object, and what light there is beyond the vertices. */
-  private cuts = new Map<number, Cuts>();
-  private beyond = new Map<number, Uint16Array>();
-  /** Cuts whose light has not come. */
-  private coming = new Map<number, CutsFrame>();
   private sky: Mesh<SphereGeometry, ShaderMaterial>;
   private meter = new WebGLRenderTarget(METER[0], METER[1], { type: FloatType, format: RGBAFormat });
   private isMetering = false;
@@ -179,8 +175,7 @@ export class Stage {
   remove(object: number): void {
     const old = this.surfaces.get(object);
     if (!old) return;
-    this.cut({ object, number: 0, cuts: [] });
-    this.beyond.delete(object);
+    this.cuts.remove(old);
     this.root.remove(old);
     this.batches.remove(old);
     old.dispose();
@@ -193,11 +188,7 @@ export class Stage {
   dress(surface: Surface, look: Look): void {
     surface.look = look;
     this.batches.put(surface);
-    const cuts = this.cuts.get(surface.object);
-    if (cuts) {
-      cuts.look = look;
-      this.batches.put(cuts);
-    }
+    this.cuts.dress(surface);
     this.change();
   }
 
@@ -208,67 +199,26 @@ export class Stage {
       (surface.light.array as Uint16Array).set(own, 3 * first);
       this.batches.shine(surface, first, own.length / 3);
     }
-    if (own.length < values.length) this.shineBeyond(surface, Math.max(0, first - surface.light.count), values.subarray(own.length));
+    if (own.length < values.length) this.cuts.shine(surface, Math.max(0, first - surface.light.count), values.subarray(own.length));
     this.change();
   }
 
   /** None of its light is known. */
   darken(surface: Surface): void {
-    const beyond = this.beyond.get(surface.object)?.length ?? 0;
-    this.shine(surface, 0, new Uint16Array(surface.light.array.length + beyond));
+    this.shine(surface, 0, new Uint16Array(surface.light.array.length + 3 * this.cuts.count(surface)));
   }
 
-  private shineBeyond({ object }: Surface, first: number, values: Uint16Array): void {
-    let beyond = this.beyond.get(object) ?? new Uint16Array(0);
-    if (beyond.length < 3 * first + values.length) {
-      const old = beyond;
-      beyond = new Uint16Array(3 * first + values.length);
-      beyond.set(old);
-      this.beyond.set(object, beyond);
-    }
-    beyond.set(values, 3 * first);
-    const coming = this.coming.get(object);
-    // The light of a layer may be that of other cuts still.
-    if (first === 0 && coming?.number === beyond[0] + 65536 * beyond[1]) return this.reveal(coming);
-    const cuts = this.cuts.get(object);
-    if (!cuts) return;
-    const [from, to] = [Math.max(first, 1), Math.min(first + values.length / 3, cuts.light.count + 1)];
-    if (to <= from) return;
-    (cuts.light.array as Uint16Array).set(beyond.subarray(3 * from, 3 * to), 3 * (from - 1));
-    this.batches.shine(cuts, from - 1, to - from);
-  }
-
-  /** Other elements of an object are cut than before. They are drawn when their light comes. */
+  /** Other elements of an object are cut than before. */
   cut(frame: CutsFrame): void {
-    this.coming.set(frame.object, frame);
-    if (frame.cuts.length === 0) this.reveal(frame);
-  }
-
-  /** Draws the elements that are cut now. Light that is what it was does not come again, and what is yet to come is even till then. */
-  private reveal(frame: CutsFrame): void {
-    const { object } = frame;
-    this.coming.delete(object);
-    const old = this.cuts.get(object);
-    if (old) {
-      this.batches.remove(old);
-      old.dispose();
-      this.cuts.delete(object);
-    }
-    const surface = this.surfaces.get(object);
-    if (surface && frame.cuts.length > 0) {
-      const cuts = new Cuts(surface, frame);
-      (cuts.light.array as Uint16Array).set(this.beyond.get(object)!.subarray(3, 3 + 3 * cuts.light.count));
-      this.cuts.set(object, cuts);
-      this.batches.put(cuts);
-    }
+    const surface = this.surfaces.get(frame.object);
+    if (!surface) return;
+    this.cuts.cut(surface, frame);
     this.change();
   }
 
   /** Irradiance at a point of a triangle as it is shown now, lux per band. */
   light(surface: Surface, triangle: number, uv: [number, number]): number[] {
-    const cuts = this.cuts.get(surface.object);
-    const around = cuts?.around(triangle, uv);
-    return around ? cuts!.between(around) : surface.between(surface.around(triangle, uv)!);
+    return this.cuts.light(surface, triangle, uv) ?? surface.between(surface.around(triangle, uv)!);
   }
 
   /** Illuminance there, lx. */
@@ -281,11 +231,7 @@ export class Stage {
     this.moves += 1;
     surface.updateMatrixWorld(true);
     this.batches.place(surface);
-    const cuts = this.cuts.get(surface.object);
-    if (cuts) {
-      cuts.visible = surface.visible;
-      this.batches.place(cuts);
-    }
+    this.cuts.place(surface);
     surface.geometry.boundingBox ?? surface.geometry.computeBoundingBox();
     this.boxes.set(surface.object, surface.geometry.boundingBox!.clone().applyMatrix4(surface.matrixWorld));
     this.change();
