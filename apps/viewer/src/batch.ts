@@ -1,7 +1,6 @@
 // Surfaces are drawn together: those with the same picture are ranges of one large mesh, and one call draws all of it that
 // is in sight. What differs between them, place, tint and emission, lies in tables that the vertex shader reads.
 import { BatchedMesh, type BufferAttribute, DataTexture, Float16BufferAttribute, FloatType, FrontSide, GLSL3, type Group, RGBAFormat, ShaderMaterial, type Texture } from 'three';
-import { Cuts } from './cuts';
 import { FRAGMENT, shared, type Surface, VERTEX } from './surface';
 
 /** Texels of the table for each surface: tint, emission, transmittance. */
@@ -118,7 +117,7 @@ class Batch {
 
 /** What surfaces have in common that are drawn together. */
 function keyOf(surface: Surface): string {
-  return `${surface.look.texture?.uuid ?? ''} ${surface.isSheet} ${surface instanceof Cuts}`;
+  return `${surface.look.texture?.uuid ?? ''} ${surface.isSheet} ${surface.isOfParts}`;
 }
 
 /** All surfaces, by what they have to share to be drawn together. */
@@ -163,7 +162,7 @@ export class Batches {
       const key = keyOf(surface);
       let batch = this.batches.get(key);
       if (!batch) {
-        batch = new Batch(this.root, surface.look.texture, surface.isSheet, surface instanceof Cuts);
+        batch = new Batch(this.root, surface.look.texture, surface.isSheet, surface.isOfParts);
         this.batches.set(key, batch);
       }
       if (!together.has(batch)) together.set(batch, []);

@@ -41,6 +41,8 @@ function cutting(parts: number): Cutting {
 
 /** The elements of a surface that are cut, as a surface of their own that nothing else meets. */
 class CutElements extends Surface {
+  override readonly isOfParts = true;
+
   constructor(whole: Surface, frame: CutsFrame) {
     const { position, uv, paint } = whole.geometry.attributes;
     const index = whole.geometry.index!;

@@ -195,6 +195,9 @@ export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
     this.layers.disableAll();
   }
 
+  /** Whether it is of parts of elements, drawn over the whole ones of another surface. */
+  readonly isOfParts: boolean = false;
+
   /** Whether light passes through. */
   get isSheet(): boolean {
     return this.look.transmittance.some((tau) => tau > 0);

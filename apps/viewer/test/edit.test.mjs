@@ -446,6 +446,20 @@ test('shadows have sharp edges, also when what casts them was moved', () => inSt
   const across = (z) => page.evaluate((places) => places.map((z) => window.radiosity.lux([-0.3, 0, z, 0, 1, 0])), [-0.03, 0.03].map((way) => edge(z) + way));
   const [lit, dark] = await across(0);
   assert.ok(lit > 3 * dark && dark > 0, `${lit} lx and ${dark} lx`);
+  // Pixels beside the edge show the light of the parts and not that of the elements beneath.
+  const beside = await page.evaluate((z) => {
+    const { stage, exposure } = window.radiosity.app;
+    exposure.set(-5);
+    const { clientWidth: width, clientHeight: height } = stage.canvas;
+    const [columns, ways] = [Array.from({ length: 40 }, (_, i) => -0.6 + 0.03 * i), [-0.12, -0.08, -0.05, 0.05, 0.08, 0.12]];
+    return columns.flatMap((x) => ways.map((way) => stage.project(stage.toWorld([x, 0, z + way])))).map(({ x, y }) => [x / width, y / height]);
+  }, edge(0));
+  const pixels = (await pixelsOf(page, beside)).filter((place) => place?.name === 'floor');
+  assert.ok(pixels.length > 60, `${pixels.length} pixels`);
+  for (const place of pixels) {
+    const right = shown(place, -5);
+    place.pixel.forEach((byte, band) => assert.ok(Math.abs(byte - right[band]) <= 5, `${place.pixel}, and by its light ${right}`));
+  }
   const { edits } = (await state(page)).status;
   const { id } = await named(page, 'sheet');
   await page.evaluate((object) => window.radiosity.app.edit({ move: { object, matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0.3, 1] } }), id);

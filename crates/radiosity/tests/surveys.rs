@@ -99,7 +99,10 @@ fn elements_are_cut_where_light_has_an_edge() {
     let elements = session.irradiance(floor).len();
     assert!(!cuts.is_empty() && cuts.len() < elements / 2, "{} of {elements} elements are cut", cuts.len());
     assert_eq!(light(&session, Layer::Total), light(&session, Layer::Direct));
-    assert!(light(&session, Layer::Indirect).iter().all(|light| light[1].abs() < 1e-3));
+    assert_eq!(light(&session, Layer::Bounce(0)), light(&session, Layer::Direct));
+    for layer in [Layer::Indirect, Layer::Bounce(1), Layer::Bounce(3)] {
+        assert!(light(&session, layer).iter().all(|light| light[1].abs() < 1e-3), "{layer:?}");
+    }
 
     let mut dice = radiosity_trace::sampling::Random::new(7);
     let mut anywhere = || SurfacePlace {

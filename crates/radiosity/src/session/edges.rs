@@ -394,9 +394,9 @@ impl Session {
             _ => None,
         };
         let is_in = |strand: usize| match layer {
-            Layer::Total | Layer::Direct | Layer::Bounce(_) => true,
+            Layer::Total | Layer::Direct | Layer::Bounce(0) => true,
             Layer::Light(_) => own == Some(strand),
-            Layer::Indirect | Layer::Error | Layer::RelativeError => false,
+            Layer::Indirect | Layer::Bounce(_) | Layer::Error | Layer::RelativeError => false,
         };
         let mut all: Vec<Bands> = Vec::new();
         for (element, cut) in self.cuts_of(object.0 as usize) {
