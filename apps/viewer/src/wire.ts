@@ -144,6 +144,8 @@ export interface PlaneAnswer {
   covered: number;
   /** Points that are left out, as they lie in the zone along walls. */
   walled: number;
+  /** Points that are left out, as walls stand between: of other rooms, or within what is taken for walls. */
+  beyond: number;
   /** Standard error of a point by its rays, over the mean. */
   error: number;
   /** Edits that are in it. */

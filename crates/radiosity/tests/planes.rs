@@ -8,7 +8,7 @@ mod room;
 use finish::finish;
 use glam::{DMat4, DVec3};
 use radiosity::session::{
-    Edit, LightId, ObjectId, Plane, PlaneError, PlaneQuestion, PlaneReading, Session, SessionOptions,
+    Edit, LightId, ObjectId, Plane, PlaneError, PlaneFigures, PlaneQuestion, PlaneReading, Session, SessionOptions,
 };
 use radiosity::{
     MeasureOptions, Mesh, PointLight, PointLightKind, Scene, Sky, Tracer, cornell_box, luminance, measure,
@@ -158,6 +158,10 @@ fn points_keep_off_things_and_walls() {
         );
         assert_eq!(at.iter().any(|p| is_in_chest(*p)), !has_chest, "{height}");
         assert_eq!(reading.figures.covered > 0, has_chest, "{height}");
+        // Each cell of the floor is told of once; those of the other room lie behind a wall.
+        let PlaneFigures { size, cell, covered, walled, beyond, .. } = reading.figures;
+        let cells = (size[0] / cell[0] * size[1] / cell[1]).round() as usize;
+        assert!(beyond > 3 && at.len() + covered + walled + beyond == cells, "{:?}", reading.figures);
         // The room goes on behind the chest.
         for corner in [v(0.7, height, 0.7), v(0.7, height, 3.3), v(3.2, height, 0.7), v(3.2, height, 3.3)] {
             assert!(at.iter().any(|p| p.distance(corner) < 0.5), "{corner}");

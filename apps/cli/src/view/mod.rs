@@ -51,9 +51,9 @@ pub struct Arguments {
     #[arg(long)]
     no_open: bool,
     /// About how many elements to make; each triangle is one at least.
-    #[arg(long, value_name = "N", default_value_t = SessionOptions::default().elements, conflicts_with = "element_size",
-        allow_negative_numbers = true)]
-    elements: usize,
+    #[arg(long, value_name = "N", default_value_t = SessionOptions::default().elements as u32,
+        conflicts_with = "element_size", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
+    elements: u32,
     /// Width of an element in metres, instead of letting the program choose.
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     element_size: Option<f64>,
@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let parsed = input::parse(&arguments.scene)?;
     let options = SessionOptions {
         element_size: arguments.element_size,
-        elements: arguments.elements,
+        elements: arguments.elements as usize,
         rays: arguments.rays,
         places: PLACES,
         memory: arguments.memory,

@@ -101,6 +101,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("compare --solvers cg,gauss", "no solver is called \"gauss\"; there are jacobi"),
         ("compare --budget 60", "with its unit from 1s to 24h"),
         ("compare --elements 0", "4..=1000000"),
+        ("view --elements 0", "1..=4294967295"),
         ("compare --memory 1M", "ask for fewer elements"),
         ("compare -o a.pdf", "must end in .html or .json"),
         ("factors .", ".: is a folder (name the .vs3, .glb"),

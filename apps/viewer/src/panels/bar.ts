@@ -7,7 +7,7 @@ import { button, choice, el } from './parts';
 export function bar(app: App, { help, fold }: { help(): void; fold(): void }): HTMLElement {
   const title = el('b', { class: 'scene' });
   const progress = el('i', { class: 'progress', role: 'progressbar', 'aria-label': 'Solution', 'aria-valuemin': 0, 'aria-valuemax': 100 });
-  const sight = el('span', { id: 'in-sight', title: 'How far the picture is off in sight, edges of shadows and all: measured at 160 places with rays of their own, over the light there, root mean square. The light meter and grids measure at their own points and are as exact as those' });
+  const sight = el('span', { id: 'in-sight', title: 'How far the picture is off in sight, edges of shadows and all: measured at 160 places with rays of their own, over the light there, root mean square; smaller elements make it less (--elements). The light meter and grids measure at their own points and are as exact as those' });
   const error = el('span', { class: 'wide', id: 'error', title: 'Noise of the rays of all light together (L2); that elements have a size is not in it' });
   const rays = el('span', { class: 'wide', id: 'rays' });
   const left = el('span', { class: 'wide', id: 'left' });

@@ -45,6 +45,9 @@ function bar({ name, share }: Share): HTMLElement {
   return el('div', { class: 'bar' }, el('span', {}, name), el('b', {}, `${(100 * share).toFixed(1)} %`), el('i', { style: `width:${Math.min(100, 100 * share)}%` }));
 }
 
+/** Why a plane may have few points. */
+const LITTLE = 'Most of this surface is left out, as it lies beside walls or behind them. What is one object with the walls counts as a wall: furniture needs objects of its own.';
+
 export function gridPanel(app: App): HTMLElement {
   const element = section('grid', 'Measuring grid', false);
   const facts = el('div', { class: 'facts' });
@@ -72,11 +75,12 @@ export function gridPanel(app: App): HTMLElement {
       fill(input, String(value));
     }
     clear.hidden = !grid && !plane;
+    const answer = plane?.answer;
+    const isLittle = answer && answer.points.length + answer.covered < answer.walled + answer.beyond;
     warning.textContent = grid && app.layer !== 'total'
       ? `Not all light, but the layer that is shown: ${layerName(app, app.layer)}.`
-      : [lateness(app), plane && app.layer !== 'total' ? 'Of all light, whichever layer is shown.' : ''].filter(Boolean).join(' ');
+      : [lateness(app), plane && app.layer !== 'total' ? 'Of all light, whichever layer is shown.' : '', isLittle ? LITTLE : ''].filter(Boolean).join(' ');
     warning.hidden = !warning.textContent;
-    const answer = plane?.answer;
     const told = grid
       ? { ...grid, covered: grid.points.length - open(grid).length }
       : answer && { ...answer, largest: answer.most, isCoarse: answer.is_coarse };
@@ -93,6 +97,7 @@ export function gridPanel(app: App): HTMLElement {
       fact('Points', String(grid ? points.length - covered : points.length)),
       ...(covered > 0 ? [fact('Covered, left out', String(covered))] : []),
       ...(answer?.walled ? [fact('Along walls and what is high or fixed, left out', String(answer.walled))] : []),
+      ...(answer?.beyond ? [fact('Behind walls, left out', String(answer.beyond))] : []),
       ...(noise === undefined ? [] : [fact('Noise of a point', `± ${(100 * noise).toPrecision(2)} %`)]),
       fact('Cells', metres(cell) + (isCoarse ? ', coarser than the standard' : '')),
       fact(answer ? 'Plane' : 'Surface', metres(size)),

@@ -1,16 +1,19 @@
 //! The mesh of an object that is drawn: its elements as triangles, with light at their corners.
 //!
 //! Elements around a vertex on the same smooth surface of the object share one value, their mean by area: light is
-//! continuous across them and most of the noise of their rays averages out.
+//! continuous across them and most of the noise of their rays averages out. Where elements of different sizes meet along a line, corners
+//! follow the longer edges (`seams`).
 //!
 //! What is left of that noise made walls mottled. So the part of the light that rays found is averaged over neighbouring vertices
 //! besides, as far as these differ by no more than noise explains (a bilateral filter: Tomasi and Manduchi 1998). What lamps
 //! bring directly has edges of shadows and stays as it is. The weights follow from all light together and are the same for every
 //! layer of it, so that layers still add up.
 
+use super::seams::{Hanging, hanging};
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{Bands, Scene, Side, Surface};
 use radiosity_transport::live::Shape;
+use rustc_hash::FxHashMap;
 use std::collections::HashMap;
 
 /// Vertices nearer than this part of the scene's half extent are one, as far as light goes: exporters' single precision.
@@ -72,9 +75,28 @@ pub struct Display {
     /// Spots beside each, as `starts`.
     beside_starts: Vec<u32>,
     beside: Vec<u32>,
+    /// Spots whose light is that of the longer edges in which they lie, those that follow others after these.
+    following: Vec<Following>,
+    /// Where each of them stands in the list.
+    following_of: FxHashMap<u32, u32>,
+}
+
+/// A spot within an edge, and how much its second end counts.
+#[derive(Clone, Copy, Debug)]
+struct Following {
+    spot: u32,
+    ends: [u32; 2],
+    share: f32,
+}
+
+impl Following {
+    fn between(&self, [a, b]: [Bands; 2]) -> Bands {
+        std::array::from_fn(|band| (1.0 - self.share) * a[band] + self.share * b[band])
+    }
 }
 
 struct Spot {
+    place: DVec3,
     normal: Vec3,
     around: Vec<(u32, f32)>,
     /// Vertices at the spot, by the bits of their texture coordinates.
@@ -110,6 +132,7 @@ impl Display {
             }
             display.indices.extend(own);
         }
+        display.find_seams(&mut spots, half, grain);
         display.starts.push(0);
         for spot in &spots {
             let whole: f32 = spot.around.iter().map(|(_, weight)| weight).sum();
@@ -119,6 +142,22 @@ impl Display {
         }
         display.find_beside();
         display
+    }
+
+    /// What is around spots that lie within edges, and which of them follow these.
+    fn find_seams(&mut self, spots: &mut [Spot], half: f64, grain: f64) {
+        let places: Vec<(DVec3, Vec3)> = spots.iter().map(|spot| (spot.place, spot.normal)).collect();
+        let corners: Vec<u32> = self.indices.iter().map(|vertex| self.spot[*vertex as usize]).collect();
+        for Hanging { spot, element, between } in hanging(&places, &corners, half, grain, SMOOTH) {
+            // Both sides of the line count as much.
+            let around = &mut spots[spot as usize].around;
+            let weight = around.iter().map(|(_, weight)| weight).sum();
+            around.push((element, weight));
+            if let Some((ends, share)) = between {
+                self.following_of.insert(spot, self.following.len() as u32);
+                self.following.push(Following { spot, ends, share });
+            }
+        }
     }
 
     /// Which spots share an edge of an element.
@@ -152,11 +191,15 @@ impl Display {
         if let Some(weights) = weights {
             self.average(&mut rest, weights);
         }
-        let whole = |spot: &u32| {
-            let (lamps, rest) = (spots[*spot as usize].0, rest[*spot as usize]);
+        let whole = |(([a, b, c, ..], _), rest): (&([f32; 6], f32), &Bands)| -> Bands {
+            let lamps = [a, b, c];
             std::array::from_fn(|band| (lamps[band] + rest[band]).max(0.0))
         };
-        self.spot.iter().map(whole).collect()
+        let mut whole: Vec<Bands> = spots.iter().zip(&rest).map(whole).collect();
+        for following in &self.following {
+            whole[following.spot as usize] = following.between(following.ends.map(|end| whole[end as usize]));
+        }
+        self.spot.iter().map(|spot| whole[*spot as usize]).collect()
     }
 
     /// Light at a place of a triangle, given what [`Display::light`] answers.
@@ -203,7 +246,17 @@ impl Display {
     /// Direct light at the corners of an element, from that of the elements, none of what is buried: as [`Display::light`] has it.
     pub fn corners(&self, element: u32, of: impl Fn(u32) -> Option<Bands>) -> [Bands; 3] {
         let corners = &self.indices[3 * element as usize..][..3];
-        [0, 1, 2].map(|k| self.at_spot(self.spot[corners[k] as usize] as usize, &of).0)
+        [0, 1, 2].map(|k| self.direct(self.spot[corners[k] as usize], &of))
+    }
+
+    fn direct(&self, spot: u32, of: &impl Fn(u32) -> Option<Bands>) -> Bands {
+        match self.following_of.get(&spot) {
+            Some(place) => {
+                let following = &self.following[*place as usize];
+                following.between(following.ends.map(|end| self.direct(end, of)))
+            }
+            None => self.at_spot(spot as usize, of).0,
+        }
     }
 
     /// The weights of averages, by `guide`, the luminance of what rays found of all light, and the most that is taken for its
@@ -281,7 +334,7 @@ fn vertex(
     let here = at_place.entry((point / grain).round().to_array().map(|x| x as i64)).or_default();
     let known = here.iter().find(|spot| spots[**spot as usize].normal.dot(normal) >= SMOOTH).copied();
     let spot = known.unwrap_or_else(|| {
-        spots.push(Spot { normal, around: Vec::new(), vertices: Vec::new() });
+        spots.push(Spot { place: point, normal, around: Vec::new(), vertices: Vec::new() });
         here.push(spots.len() as u32 - 1);
         spots.len() as u32 - 1
     });
@@ -355,6 +408,41 @@ mod tests {
         // What lamps bring is the mean of what is around, whatever the noise of the rest.
         let lamp = |element: u32| Light { lamps: [found(element); 3], rest: [0.0; 3] };
         assert_eq!(display.light(lamp, Some(&weights), |_| false), plain);
+    }
+
+    /// On both sides of a line along which elements of 25 cm meet such of 33 cm, without a corner in common but for its ends.
+    #[test]
+    fn light_is_one_on_both_sides_of_a_seam() {
+        let v = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let quad = |low: DVec3, high: DVec3| [[low, v(high.x, low.y), high], [low, high, v(low.x, high.y)]];
+        let third = |k: f64| [v(0.0, k / 3.0), v(1.0 / 3.0, (k + 1.0) / 3.0)];
+        let sides = [[v(-1.0, 0.0), v(0.0, 1.0)], third(0.0), third(1.0), third(2.0)];
+        let mut scene = Scene::default();
+        scene.materials.push(Default::default());
+        scene.add_triangles("floor", 0, &sides.into_iter().flat_map(|[low, high]| quad(low, high)).collect::<Vec<_>>());
+        let shape = Shape::new(&scene, 0, 0.3);
+        let display = Display::new(&scene, 0, &shape, 1.0);
+        let of = |element: u32| Some([100.0 * (1.0 + 0.05 * noise(element)); 3]);
+        let light = display.light(|element| Light { lamps: of(element).unwrap(), rest: [0.0; 3] }, None, |_| false);
+        let corner = |vertex: u32| display.positions[vertex as usize];
+        // Light along the line, from the elements of a side whose edges are in it.
+        let along = |side: f32, y: f32| {
+            let edges = display.indices.chunks_exact(3).filter(|own| own.iter().any(|k| side * corner(*k)[0] > 0.0));
+            let edges = edges.flat_map(|own| [[own[0], own[1]], [own[1], own[2]], [own[2], own[0]]]);
+            let [a, b] = edges
+                .filter(|ends| ends.iter().all(|k| corner(*k)[0] == 0.0 && display.normals[*k as usize][2] > 0.5))
+                .find(|ends| (corner(ends[0])[1] - y) * (corner(ends[1])[1] - y) <= 0.0)
+                .unwrap();
+            let share = (y - corner(a)[1]) / (corner(b)[1] - corner(a)[1]);
+            (1.0 - share) * light[a as usize][1] + share * light[b as usize][1]
+        };
+        let apart = (0..1000).map(|k| (k as f32 + 0.5) / 1000.0).map(|y| (along(-1.0, y) - along(1.0, y)).powi(2));
+        let apart = (apart.sum::<f32>() / 1000.0).sqrt();
+        assert!(display.following.len() == 3 && apart < 1.0, "{} {apart}", display.following.len());
+        for element in 0..display.indices.len() as u32 / 3 {
+            let shown = [0, 1, 2].map(|k| light[display.indices[3 * element as usize + k] as usize]);
+            assert_eq!(display.corners(element, of), shown);
+        }
     }
 
     #[test]

@@ -47,6 +47,7 @@ mod plane;
 mod probe;
 mod rectangle;
 mod saved;
+mod seams;
 mod solve;
 mod state;
 mod survey;

@@ -134,6 +134,8 @@ pub struct PlaneFigures {
     /// Points above the surface that are left out as they lie in the zone along the walls of this room; things of 2 m, and what cannot be moved, are
     /// walls.
     pub walled: usize,
+    /// All other points above the surface: of other rooms, or within what is taken for walls.
+    pub beyond: usize,
     /// One standard error of a point, in the root mean square, over the mean: by rays alone, the elements' size is not in it.
     pub error: f32,
 }
@@ -428,6 +430,7 @@ impl Session {
         let least = points.iter().map(|point| point.lux).fold(f32::INFINITY, f32::min);
         let over = |x: f64| if mean > 0.0 { (x / mean) as f32 } else { 0.0 };
         let covered = plane.cells.iter().zip(&is_reached).filter(|of| of == &(&Cell::Inside, &true)).count();
+        let above = plane.cells.iter().filter(|cell| **cell != Cell::Outside).count();
         let figures = PlaneFigures {
             size: [0, 1].map(|k| layout.cell[k] * layout.counts[k] as f64),
             cell: layout.cell.to_array(),
@@ -439,6 +442,7 @@ impl Session {
             uniformity: over(f64::from(least)),
             covered,
             walled,
+            beyond: above - points.len() - covered - walled,
             error: over(square.sqrt()),
         };
         Ok(PlaneReading { points, figures })
