@@ -279,7 +279,7 @@ export class App {
     const chosen = this.selected === null ? undefined : this.objects.get(this.selected);
     if (!chosen?.deleted) return false;
     const heir = this.heir(chosen);
-    if (heir === null || this.stage.surfaces.has(heir)) this.mark(heir);
+    if (heir === null || (this.objects.has(heir) && this.stage.surfaces.has(heir))) this.mark(heir);
     return true;
   }
 
