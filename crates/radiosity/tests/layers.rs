@@ -2,12 +2,15 @@
 
 #[path = "common/finish.rs"]
 mod finish;
+#[path = "common/furnace.rs"]
+mod furnace;
 #[path = "common/furnished.rs"]
 mod furnished;
 #[path = "common/room.rs"]
 mod room;
 
 use finish::finish;
+use furnace::furnace;
 use furnished::{furnished, small};
 use radiosity::session::{
     Edit, Form, Layer, LightId, LightKind, NewObject, ObjectId, Session, SessionOptions, SurfacePlace,
@@ -267,13 +270,7 @@ fn layers_are_of_one_state_while_light_follows() {
 /// A furnace: in a closed box of reflectance ρ whose walls all shine alike, H = E/(1 − ρ) everywhere.
 #[test]
 fn a_furnace_is_uniform() {
-    let mut scene = room(&Furnishing { tables: 1, lamps: 0, books: 0 });
-    scene.lights.clear();
-    for material in &mut scene.materials {
-        material.base_color = [0.5, 0.5, 0.5, 1.0];
-        material.emissive = [100.0 / std::f32::consts::PI; 3];
-    }
-    let mut session = Session::new(scene, &small()).unwrap();
+    let mut session = Session::new(furnace(1), &small()).unwrap();
     finish(&mut session);
     let (mut defect, mut whole) = (0.0, 0.0);
     for object in (0..session.model().objects.len() as u32).map(ObjectId) {

@@ -2,10 +2,13 @@
 
 #[path = "common/finish.rs"]
 mod finish;
+#[path = "common/furnace.rs"]
+mod furnace;
 #[path = "common/room.rs"]
 mod room;
 
 use finish::finish;
+use furnace::furnace;
 use glam::{DMat4, DVec3};
 use radiosity::session::{
     Edit, LightId, ObjectId, Plane, PlaneError, PlaneFigures, PlaneQuestion, PlaneReading, Session, SessionOptions,
@@ -118,13 +121,7 @@ fn a_lamp_over_a_black_floor_is_its_closed_form() {
 /// Between walls of a furnace light is the same everywhere in the air, too.
 #[test]
 fn a_furnace_is_uniform_in_the_air() {
-    let mut scene = room(&Furnishing { tables: 0, lamps: 0, books: 0 });
-    scene.lights.clear();
-    for material in &mut scene.materials {
-        material.base_color = [0.5, 0.5, 0.5, 1.0];
-        material.emissive = [100.0 / std::f32::consts::PI; 3];
-    }
-    let session = lit(scene, 500);
+    let session = lit(furnace(0), 500);
     for height in [0.0, 0.75, 2.9] {
         let reading = read(&session, over(0, height, 0.5)).unwrap();
         for point in &reading.points {

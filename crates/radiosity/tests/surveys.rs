@@ -2,17 +2,19 @@
 
 #[path = "common/finish.rs"]
 mod finish;
+#[path = "common/furnace.rs"]
+mod furnace;
 #[path = "common/room.rs"]
 mod room;
 
 use finish::finish;
+use furnace::furnace;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 use radiosity::session::{
     Edit, Layer, LightId, NewLight, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed,
 };
 use radiosity::{Material, PointLight, PointLightKind, Scene};
 use rayon::prelude::*;
-use room::{Furnishing, room};
 use std::time::Duration;
 
 /// Measured in as many slices as it takes.
@@ -176,14 +178,8 @@ fn layers_of_many_objects_are_read_together() {
 /// nothing to tell.
 #[test]
 fn the_error_in_sight_is_without_the_noise_of_its_readings() {
-    let mut scene = room(&Furnishing { tables: 0, lamps: 0, books: 0 });
-    scene.lights.clear();
-    for material in &mut scene.materials {
-        material.base_color = [0.5, 0.5, 0.5, 1.0];
-        material.emissive = [100.0 / std::f32::consts::PI; 3];
-    }
     let options = SessionOptions { elements: 3000, rays: 1024, ..SessionOptions::default() };
-    let mut session = Session::new(scene, &options).unwrap();
+    let mut session = Session::new(furnace(0), &options).unwrap();
     finish(&mut session);
     let model = session.model();
     let [low, high] = model.bounds.map(DVec3::from);

@@ -4,7 +4,7 @@ import { LAMPS, type LampKind } from '../lamps';
 import { luminance } from '../luminance';
 import { readable } from '../scale';
 import type { LightNotice } from '../wire';
-import { button, el, fill, hex, linear, section, slider } from './parts';
+import { button, el, fill, fillNumber, hex, linear, section, slider } from './parts';
 
 const KINDS = { object: 'Luminous surface', point: 'Point', spot: 'Spot', directional: 'Parallel', sky: 'Sky' };
 
@@ -113,7 +113,7 @@ function row(app: App, id: number): Row {
       // What gives no light at all cannot be turned up.
       absolute.hidden = undimmed(now) <= 0;
       amount.max = String(MOST_DIMMING * undimmed(now));
-      fill(amount, String(Number((now.dimming * undimmed(now)).toPrecision(4))));
+      fillNumber(amount, now.dimming * undimmed(now));
       const peak = Math.max(...now.colour, 1e-9);
       fill(colour, hex(now.colour.map((c) => c / peak)));
     },

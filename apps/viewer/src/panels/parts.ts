@@ -33,6 +33,11 @@ export function fill(input: HTMLInputElement, text: string): void {
   if (document.activeElement === input && input.type === 'number') input.select();
 }
 
+/** The same with a number, of so many digits. */
+export function fillNumber(input: HTMLInputElement, value: number, digits = 4): void {
+  fill(input, String(Number(value.toPrecision(digits))));
+}
+
 // A field is open from the first letter until it is said or left.
 addEventListener('input', ({ target }) => { (target as HTMLElement).dataset.open = ''; }, { capture: true });
 for (const end of ['change', 'focusout']) addEventListener(end, ({ target }) => { delete (target as HTMLElement).dataset?.open; }, { capture: true });

@@ -6,7 +6,7 @@ import { turnOf } from '../gizmo';
 import { brighter, LAMPS, type LampKind, remade, solidAngle, sunOf } from '../lamps';
 import { luminance } from '../luminance';
 import { coordinate } from '../scale';
-import { button, choice, el, fill, hex, linear, section } from './parts';
+import { button, choice, el, fill, fillNumber, hex, linear, section } from './parts';
 
 /** As much as a surface may reflect: with 1 in a closed room light would never end. */
 const most = (reflectance: number[]) => reflectance.map((r) => Math.min(0.99, r));
@@ -191,21 +191,20 @@ export function thingPanel(app: App): HTMLElement {
     if (!sizing.hidden) fill(tilt, String(Math.round((1800 * app.adding.tilt()) / Math.PI) / 10 || 0));
     lengths.forEach((input, k) => {
       input.parentElement!.hidden = k >= size.length;
-      if (k < size.length) fill(input, String(Number(size[k].toPrecision(4))));
+      if (k < size.length) fillNumber(input, size[k]);
     });
     lighting.hidden = !light?.intensity;
     if (light?.intensity) {
-      const write = (input: HTMLInputElement, value: number) => fill(input, String(Number(value.toPrecision(4))));
       const candela = luminance(light.intensity);
       kind.value = light.type;
-      write(intensity, candela);
-      write(flux, candela * solidAngle(light.cone));
+      fillNumber(intensity, candela);
+      fillNumber(flux, candela * solidAngle(light.cone));
       unit.textContent = light.type === 'directional' ? 'lx' : 'cd';
       intensity.setAttribute('aria-label', light.type === 'directional' ? 'Illuminance, lux' : 'Intensity, candela');
       // A spot that has no width has no lumens, either.
       fluxes.hidden = light.type === 'directional' || solidAngle(light.cone) === 0;
       cones.hidden = !light.cone;
-      light.cone?.forEach((angle, k) => write(cone[k], (angle * 180) / Math.PI));
+      light.cone?.forEach((angle, k) => fillNumber(cone[k], (angle * 180) / Math.PI));
     }
     const spot = app.spot();
     // Parallel light has no place.

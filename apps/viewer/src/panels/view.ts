@@ -4,7 +4,7 @@ import { CURVES, type Curve } from '../curve';
 import { MOST } from '../exposure';
 import { shared } from '../surface';
 import type { Layer } from '../wire';
-import { button, choice, el, fill, section, slider, toggle } from './parts';
+import { button, choice, el, fillNumber, section, slider, toggle } from './parts';
 
 /** What people call a layer. */
 export function layerName(app: App, layer: Layer): string {
@@ -94,7 +94,7 @@ export function viewPanel(app: App): HTMLElement {
     for (const [input, end] of [[low, 'Lower'], [high, 'Upper']] as const) input.setAttribute('aria-label', `${end} end of the scale, ${unitOf(app.layer)}`);
     unit.textContent = unitOf(app.layer);
     for (const [input, value] of [[low, app.exposure.range[0]], [high, app.exposure.range[1]]] as const) {
-      fill(input, String(Number(value.toPrecision(3))));
+      fillNumber(input, value, 3);
     }
   });
   return section('view', 'View', true,

@@ -7,12 +7,13 @@
 use glam::{DVec3, Vec3};
 use rustc_hash::FxHashMap;
 
-/// Lines whose direction differs by less than this, and whose distance by less than that, as a share of half the scene's extent, are held
-/// against each other.
+/// Lines are held against each other if their directions, and where they pass the origin, are the same in steps of this size: the second
+/// by half the scene's extent.
 const ALIKE: f64 = 1.0 / 64.0;
 const NEAR: f64 = 1e-3;
 
-/// A share of the step above that no length in a file is a multiple of: what lies in one line is rounded to one side.
+/// By how much of a step they are shifted before they are rounded: what lies in one line is hardly ever rounded to two sides. Where it is,
+/// the seam is seen.
 const OFF: f64 = 0.1371;
 
 /// By how much longer an edge leads, relative to the other.
@@ -39,7 +40,7 @@ struct Edge {
     span: [f64; 2],
 }
 
-/// The spots that lie within edges, those that follow others after these. `corners` are the spots of each element's, three by three.
+/// The spots that lie within edges, those that follow others after these. `corners` are the spots of the corners of each element, three by three.
 /// What is nearer than `grain` is at one place; normals are of one surface from the cosine `smooth` on.
 pub fn hanging(spots: &[Spot], corners: &[u32], half: f64, grain: f64, smooth: f32) -> Vec<Hanging> {
     let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(corners.len());
