@@ -89,6 +89,59 @@ fn places_read_their_own_light() {
     assert_eq!(session.survey(&mut waiting, Duration::ZERO).unwrap().readings, vec![None; 4]);
 }
 
+/// Shadows of lamps with area are soft, and are shown so; at corners of elements that are not cut the light is that of these.
+#[test]
+fn elements_are_cut_where_shadows_are_soft() {
+    let mut scene = shaded();
+    scene.lights.clear();
+    scene.materials.push(Material { emissive: [1000.0; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() });
+    let square = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]];
+    scene.add_quad("lamp", 1, square.map(|[x, z]| DVec3::new(0.2 * x, 2.0, 0.2 * z)));
+    let options = |places| SessionOptions { element_size: Some(0.4), rays: 64, places, ..SessionOptions::default() };
+    let [whole, session] = [0, 30_000].map(|places| {
+        let mut session = Session::new(scene.clone(), &options(places)).unwrap();
+        finish(&mut session);
+        session
+    });
+    let floor = ObjectId(0);
+    let cuts = session.cuts(floor);
+    let elements = session.irradiance(floor).len() as u32;
+    assert!(whole.cuts(floor).is_empty() && !cuts.is_empty() && 2 * cuts.len() < elements as usize, "{}", cuts.len());
+
+    let mut dice = radiosity_trace::sampling::Random::new(7);
+    let mut anywhere = || SurfacePlace {
+        object: floor,
+        triangle: (dice.next_unit() * f64::from(elements)) as u32,
+        uv: [0.0, 1.0].map(|_| 0.5 * dice.next_unit() as f32),
+    };
+    let places: Vec<SurfacePlace> = (0..1000).map(|_| anywhere()).collect();
+    let [before, after] = [&whole, &session].map(|session| read(session, places.clone()).off.unwrap());
+    assert!(before > 0.1 && after < 0.5 * before, "{after} instead of {before}");
+
+    let model = session.model();
+    let indices = &model.objects[0].indices;
+    let is_cut = |element: u32| cuts.iter().any(|(own, _)| *own == element);
+    let is_joined = |vertex: u32| {
+        (0..elements).filter(|e| indices[3 * *e as usize..][..3].contains(&vertex)).any(|element| !is_cut(element))
+    };
+    let light = session.light(floor, Layer::Total);
+    let places = session.light_of_cuts(floor, Layer::Total, &light);
+    let (mut first, mut joined) = (0, 0);
+    for (element, parts) in &cuts {
+        let n = *parts as usize;
+        let count = (n + 1) * (n + 2) / 2;
+        for (k, place) in [0, n, count - 1].into_iter().enumerate() {
+            let vertex = indices[3 * *element as usize + k];
+            if is_joined(vertex) {
+                joined += 1;
+                assert!((places[first + place][1] - light[vertex as usize][1]).abs() < 1e-3, "corner {k} of {element}");
+            }
+        }
+        first += count;
+    }
+    assert!(joined > 20, "{joined}");
+}
+
 /// Edges of shadows are shown as wide as a part of an element; after an edit the picture is that of a session which began so.
 #[test]
 fn elements_are_cut_where_light_has_an_edge() {
@@ -119,6 +172,16 @@ fn elements_are_cut_where_light_has_an_edge() {
     assert!(whole.cuts(floor).is_empty());
     let (before, after) = (off(&whole), off(&session));
     assert!(before > 0.1 && after < 0.3 * before, "{after} instead of {before}");
+    // Two parts, of which an element has sixteen, from the edge there is nothing of the shadow, and in it no light.
+    let is_away =
+        |p: [f64; 3]| p[0].max(0.0).hypot(p[2].max(0.0)).max(-p[0].min(p[2])) > 0.0625 && p[0].min(p[2]).abs() > 0.0625;
+    let away: Vec<_> =
+        read(&session, places.clone()).readings.into_iter().flatten().filter(|r| is_away(r.position)).collect();
+    assert!(away.len() > 1500, "{}", away.len());
+    for reading in away {
+        let apart = (reading.shown - reading.lux).abs();
+        assert!(apart <= (0.1 * reading.lux).max(1e-4), "{reading:?}");
+    }
 
     let matrix = glam::DMat4::from_translation(DVec3::new(-0.4, 0.1, 0.2)).to_cols_array();
     let edit = Edit::Move { object: ObjectId(1), matrix };

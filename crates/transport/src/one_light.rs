@@ -168,7 +168,7 @@ fn tint(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
 }
 
 /// cos θ cos θ'/(π r²) of two places, 1/m².
-fn geometry(from: &Place, to: &Place) -> f64 {
+pub fn geometry(from: &Place, to: &Place) -> f64 {
     let along = to.point - from.point;
     let square = along.length_squared();
     let cosines = along.dot(from.normal).max(0.0) * (-along.dot(to.normal)).max(0.0);

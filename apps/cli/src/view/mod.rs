@@ -71,7 +71,7 @@ const WAITING: usize = 256;
 
 /// Most places at which light is found where it has an edge within elements: pages draw up to two triangles for each, and six bytes
 /// come with every change of it. A furnished room in the sun with a garden takes all of them.
-const PLACES: usize = 150_000;
+const PLACES: usize = 200_000;
 
 /// How long open connections have to end.
 const FAREWELL: Duration = Duration::from_millis(500);

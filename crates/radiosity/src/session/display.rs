@@ -215,9 +215,31 @@ impl Display {
         self.spot[vertex as usize] as usize
     }
 
+    /// The spots of the corners of an element.
+    pub fn spots(&self, element: u32) -> [usize; 3] {
+        [0, 1, 2].map(|k| self.spot_of(self.indices[3 * element as usize + k]))
+    }
+
     /// What follows from the elements around each spot, which come with their weights.
     pub fn around_spots<T>(&self, of: impl Fn(&[(u32, f32)]) -> T) -> Vec<T> {
-        self.starts.windows(2).map(|ends| of(&self.around[ends[0] as usize..ends[1] as usize])).collect()
+        (0..self.areas.len()).map(|spot| of(self.around(spot))).collect()
+    }
+
+    /// The elements around a spot, with their weights.
+    pub fn around(&self, spot: usize) -> &[(u32, f32)] {
+        &self.around[self.starts[spot] as usize..self.starts[spot + 1] as usize]
+    }
+
+    /// 1 at a spot all elements around which are such, 0 at another; one within a longer edge follows its ends.
+    pub fn share(&self, spot: usize, are: &impl Fn(u32) -> bool) -> f32 {
+        match self.following_of.get(&(spot as u32)) {
+            Some(place) => {
+                let Following { ends, share, .. } = self.following[*place as usize];
+                let [a, b] = ends.map(|end| self.share(end as usize, are));
+                (1.0 - share) * a + share * b
+            }
+            None => f32::from(u8::from(self.around(spot).iter().all(|(element, _)| are(*element)))),
+        }
     }
 
     /// Means of the elements around each spot, as far as they are not buried, and their area there.
@@ -234,7 +256,7 @@ impl Display {
     /// The mean of the elements around a spot, as far as they are not buried, and their area there.
     fn at_spot<const N: usize>(&self, spot: usize, of: impl Fn(u32) -> Option<[f32; N]>) -> ([f32; N], f32) {
         let (mut sum, mut whole) = ([0f32; N], 0f32);
-        for (element, weight) in &self.around[self.starts[spot] as usize..self.starts[spot + 1] as usize] {
+        for (element, weight) in self.around(spot) {
             if let Some(own) = of(*element) {
                 whole += weight;
                 (0..N).for_each(|k| sum[k] += weight * own[k]);
@@ -245,8 +267,7 @@ impl Display {
 
     /// Direct light at the corners of an element, from that of the elements, none of what is buried: as [`Display::light`] has it.
     pub fn corners(&self, element: u32, of: impl Fn(u32) -> Option<Bands>) -> [Bands; 3] {
-        let corners = &self.indices[3 * element as usize..][..3];
-        [0, 1, 2].map(|k| self.direct(self.spot[corners[k] as usize], &of))
+        self.spots(element).map(|spot| self.direct(spot as u32, &of))
     }
 
     fn direct(&self, spot: u32, of: &impl Fn(u32) -> Option<Bands>) -> Bands {

@@ -27,6 +27,9 @@ const MOST_SHADOWS: u32 = 256;
 /// Places across and down a picture: their mean is known to a tenth of itself.
 const SIGHT: [u32; 2] = [16, 10];
 
+/// Light of a place over that of the brightest, up to which it is what rounding has left.
+const ROUNDING: f32 = 1e-6;
+
 /// A place on an object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfacePlace {
@@ -148,29 +151,35 @@ impl Session {
 
     /// What was measured beside what is shown.
     fn compare(&self, survey: &Survey) -> Surveyed {
-        let mut shown: BTreeMap<ObjectId, Vec<Bands>> = BTreeMap::new();
-        let (mut sum, mut squares, mut count) = (0f64, 0f64, 0u32);
+        let mut lights: BTreeMap<ObjectId, Vec<Bands>> = BTreeMap::new();
         let mut read = |(place, halves): (&SurfacePlace, &Option<[Bands; 2]>)| {
             let (halves, (position, normal)) = ((*halves)?, self.place_of(place)?);
+            let light = lights.entry(place.object).or_insert_with(|| self.light(place.object, super::Layer::Total));
+            let shown = luminance(self.shown_at(place.object.0 as usize, light, place.triangle, place.uv));
             let irradiance: Bands = std::array::from_fn(|band| 0.5 * (halves[0][band] + halves[1][band]));
             let [a, b] = halves.map(luminance);
-            let light = shown.entry(place.object).or_insert_with(|| self.light(place.object, super::Layer::Total));
-            let shown = luminance(self.shown_at(place.object.0 as usize, light, place.triangle, place.uv));
-            let most = shown.max(0.5 * (a + b)).max(f32::MIN_POSITIVE);
-            if a > 0.0 || b > 0.0 || shown > 0.0 {
+            let (lux, error) = (luminance(irradiance), 0.5 * (a - b).abs());
+            let reading =
+                Reading { position: position.to_array(), normal: normal.to_array(), irradiance, lux, error, shown };
+            Some((reading, [a, b]))
+        };
+        let found: Vec<Option<_>> = survey.places.iter().zip(&survey.halves).map(&mut read).collect();
+        let brightest = found.iter().flatten().map(|(reading, _)| reading.shown.max(reading.lux)).fold(0.0, f32::max);
+        let (mut sum, mut squares, mut count) = (0f64, 0f64, 0u32);
+        for (Reading { shown, .. }, halves @ [a, b]) in found.iter().flatten() {
+            let most = shown.max(0.5 * (a + b));
+            if most > ROUNDING * brightest {
                 // Each half is off by its own noise: in the mean their product has none.
-                let [a, b] = [a, b].map(|half| f64::from((shown - half) / most).clamp(-1.0, 1.0));
+                let [a, b] = halves.map(|half| f64::from((shown - half) / most).clamp(-1.0, 1.0));
                 sum += a * b;
                 squares += (a * b).powi(2);
                 count += 1;
             }
-            let (lux, error) = (luminance(irradiance), 0.5 * (a - b).abs());
-            Some(Reading { position: position.to_array(), normal: normal.to_array(), irradiance, lux, error, shown })
-        };
-        let readings: Vec<_> = survey.places.iter().zip(&survey.halves).map(&mut read).collect();
+        }
         // What few places cannot tell from nothing is told as what it may be.
         let n = f64::from(count.max(1));
         let (mean, spread) = (sum / n, (squares / n - (sum / n).powi(2)).max(0.0));
+        let readings = found.into_iter().map(|found| found.map(|(reading, _)| reading)).collect();
         Surveyed { readings, off: (count > 0).then(|| mean.max((spread / n).sqrt()).sqrt()) }
     }
 

@@ -3,7 +3,7 @@
 
 use super::body::Site;
 use super::chunk::{ROWS, Target, shoot};
-use super::{Column, Lanes, Live};
+use super::{Column, Lanes, Live, Spot};
 use glam::DVec3;
 use radiosity_scene::Bands;
 use radiosity_trace::sampling::{Sequence, frame, hash};
@@ -96,10 +96,38 @@ impl Live {
         sample.map_or(0.0, |sample| sample.ray.direction.as_dvec3().dot(normal).max(0.0))
     }
 
-    /// What a column that is certain brings straight to a point of the world with a unit normal, lux per band.
-    pub fn receive_from(&self, column: usize, (point, normal): (DVec3, DVec3)) -> Bands {
+    /// Whether a column is one lamp's alone.
+    pub fn is_of_one(&self, column: usize) -> bool {
+        !self.columns[column].is_empty() && self.columns[column].strength.len() == 1
+    }
+
+    /// Spots of a column's lamp, as many in all, for [`Live::receive_from`]; one without area has none.
+    pub fn spots(&self, column: usize, count: usize) -> Vec<Spot> {
+        self.columns[column].spots(&self.world, count)
+    }
+
+    /// What a column brings straight to a point of the world with a unit normal, lux per band: a lamp without area, or some of the
+    /// spots of one with area, each as if all of the lamp's light came from it. From the same spots, neighbours differ by what stands
+    /// between them and these, and by no noise.
+    pub fn receive_from(&self, column: usize, (point, normal): (DVec3, DVec3), spots: &[Spot]) -> Bands {
         let site = Site::in_the_air(point - self.world.middle, normal);
-        self.direct(&self.columns[column], &site, 0, 1)[0].map(|x| x as f32)
+        let column = &self.columns[column];
+        if column.is_certain() {
+            return self.direct(column, &site, 0, 1)[0].map(|x| x as f32);
+        }
+        let (sequence, mut sum) = (column.sequence(0), [0f64; 3]);
+        let is_near = spots.iter().any(|spot| spot.is_near(site.centre));
+        for spot in spots {
+            let sample = if is_near {
+                column.sample(&self.world, &site, (0, &sequence), spot.index)
+            } else {
+                spot.seen_from(&self.world, &site)
+            };
+            if let Some(sample) = sample.filter(|sample| !self.world.blocked(&sample.ray, sample.salt)) {
+                (0..3).for_each(|band| sum[band] += sample.light[band] / spots.len() as f64);
+            }
+        }
+        sum.map(|x| x as f32)
     }
 
     /// What a column brings straight to a place, by the halves of its rays.
@@ -163,5 +191,34 @@ mod tests {
                 assert!((half[1] / 70.0 - 1.0).abs() < 1e-6, "{n}: {half:?}");
             }
         }
+    }
+
+    /// From some way off the spots of a lamp are the lamp: a square of side 2a at height h gives a point below its middle
+    /// E = 4 M/π · (a/√(a² + h²)) · atan(a/√(a² + h²)) (Howell, configuration factor B-4 four times), and one of which half is hidden half of that; and
+    /// nearby, where the spots would be seen, they are drawn anew.
+    #[test]
+    fn spots_of_a_lamp_are_the_lamp() {
+        let mut scene = Scene::default();
+        scene.materials.extend([Material::default(), Material { emissive: [1000.0; 3], ..Material::default() }]);
+        let square = [[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]].map(DVec3::from);
+        scene.add_quad("lamp", 1, [0, 3, 2, 1].map(|k| square[k] + 3.0 * DVec3::Z));
+        scene.add_quad("sheet", 0, square.map(|corner| 4.0 * corner + DVec3::new(40.0, 0.0, 1.0)));
+        let mut live = Live::new(Arc::new(scene), 1.0, Target { rays: 4, shadows: 4 });
+        let column = live.add_column(1, &[Lamp::Body(0)]);
+        assert!(live.is_of_one(column) && !live.is_certain(column));
+        let spots = live.spots(column, 256);
+        assert_eq!(spots.len(), 256);
+        let exact = |h: f64| {
+            let c = 1.0 / (1.0 + h * h).sqrt();
+            4000.0 * c * c.atan()
+        };
+        for height in [0.2, 1.0, 3.0, 10.0] {
+            let found = live.receive_from(column, (DVec3::Z * (3.0 - height), DVec3::Z), &spots);
+            assert!((f64::from(found[1]) / exact(height) - 1.0).abs() < 0.01, "{height}: {found:?}");
+        }
+        // The sheet's edge is above the point, from x = 0 on.
+        live.place(1, glam::DAffine3::from_translation(DVec3::new(-36.0, 0.0, 0.0)));
+        let half = live.receive_from(column, (DVec3::ZERO, DVec3::Z), &spots);
+        assert!((f64::from(half[1]) / exact(3.0) - 0.5).abs() < 0.01, "{half:?}");
     }
 }

@@ -8,14 +8,18 @@
 use super::body::{Bounds, Site, bounds_of, given_at};
 use super::world::World;
 use crate::luminaires::Piece;
-use crate::one_light::sample_piece;
+use crate::one_light::{geometry, sample_piece};
 use glam::{DVec2, DVec3};
+use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Bands, PointLight, PointLightKind, Side, Surface, luminance};
 use radiosity_trace::sampling::{Sequence, hash};
 use radiosity_trace::{Place, Ray};
 
 /// The stream of sample points that shadow rays use.
 const SHADOW: u32 = 0x0700;
+
+/// Distance from a spot of a lamp, over the width of what it stands for, below which it is seen that the lamp is made of spots.
+const NEAR: f64 = 2.0;
 
 /// A light of a column.
 #[derive(Clone, Debug)]
@@ -71,6 +75,34 @@ pub struct Sample {
     pub light: [f64; 3],
     /// Decides whether blended surfaces stop it.
     pub salt: u32,
+}
+
+/// A spot of a lamp with area that stands for all of it.
+#[derive(Clone, Debug)]
+pub struct Spot {
+    /// Which sample of the lamp it is.
+    pub index: u32,
+    place: Place,
+    /// Exitance times the area of the lamp, lm per band.
+    flux: [f64; 3],
+    /// Square of the distance from which on it stands for its part of that.
+    near: f64,
+    salt: u32,
+}
+
+impl Spot {
+    /// Whether a point is so near that it is seen that the lamp is made of spots.
+    pub fn is_near(&self, point: DVec3) -> bool {
+        self.place.point.distance_squared(point) < self.near
+    }
+
+    /// The shadow ray from an element's place.
+    pub fn seen_from(&self, world: &World, site: &Site) -> Option<Sample> {
+        let from = site.place(0.0, 0.0);
+        let weight = geometry(&from, &self.place);
+        let light = self.flux.map(|flux| weight * flux);
+        (weight > 0.0).then(|| Sample { ray: between(world, &from, &self.place), light, salt: self.salt })
+    }
 }
 
 impl Column {
@@ -167,6 +199,39 @@ impl Column {
         Sequence::new(seed, SHADOW ^ hash(self.key))
     }
 
+    /// Spots of its lamps that have area, drawn by their shares of the power.
+    pub fn spots(&self, world: &World, count: usize) -> Vec<Spot> {
+        let sequence = self.sequence(0);
+        let spot = |index: u32| {
+            let [u, v, ..] = sequence.point(index).map(f64::from);
+            let (Emitter { lamp, source }, share, stretched) = self.pick(u)?;
+            let Source::Piece(piece, triangle) = source else { return None };
+            let (p, q) = triangle_from_square(stretched, v);
+            let [a, b, c] = piece.corners;
+            let point = a + p * (b - a) + q * (c - a);
+            let place = Place { point, normal: piece.normal, triangle: piece.triangle };
+            let given = self.given(world, piece, *triangle, point);
+            let strength = self.strength[*lamp];
+            let flux = |band: usize| piece.area / share * f64::from(given[band]) * f64::from(strength[band]);
+            let near = NEAR * NEAR * piece.area / share / count as f64;
+            Some(Spot { index, place, near, flux: std::array::from_fn(flux), salt: hash(self.key ^ index) })
+        };
+        (0..count as u32).filter_map(spot).collect()
+    }
+
+    /// The emitter that u in [0, 1) falls on, its share of the power, and where in that share.
+    fn pick(&self, u: f64) -> Option<(&Emitter, f64, f64)> {
+        let k = self.cumulative.partition_point(|end| *end <= u).min(self.emitters.len().checked_sub(1)?);
+        let below = if k == 0 { 0.0 } else { self.cumulative[k - 1] };
+        let share = self.cumulative[k] - below;
+        (share > 0.0).then(|| (&self.emitters[k], share, ((u - below) / share).clamp(0.0, 1.0 - 1e-9)))
+    }
+
+    /// Exitance of a piece at a point of it.
+    fn given(&self, world: &World, piece: &Piece, triangle: usize, point: DVec3) -> Bands {
+        if piece.varied { emission_at(world, piece, triangle, point) } else { piece.exitance }
+    }
+
     /// Whether shadow rays from a ball may meet what is in a box and in the ball around it; never wrong where it says no.
     pub fn may_meet(&self, (from, start): (DVec3, f64), (bounds, (centre, radius)): &(Bounds, (DVec3, f64))) -> bool {
         let (light, own) = match self.reach {
@@ -204,14 +269,7 @@ impl Column {
     pub fn sample(&self, world: &World, site: &Site, (seed, sequence): (u32, &Sequence), index: u32) -> Option<Sample> {
         let [u, v, x, y] = sequence.point(index);
         let place = site.place(x, y);
-        let u = f64::from(u);
-        let k = self.cumulative.partition_point(|end| *end <= u).min(self.emitters.len().checked_sub(1)?);
-        let below = if k == 0 { 0.0 } else { self.cumulative[k - 1] };
-        let share = self.cumulative[k] - below;
-        if share <= 0.0 {
-            return None;
-        }
-        let Emitter { lamp, source } = &self.emitters[k];
+        let (Emitter { lamp, source }, share, stretched) = self.pick(f64::from(u))?;
         let salt = hash(seed ^ hash(self.key ^ index));
         let strength = self.strength[*lamp];
         let lit = |weight: f64, given: Bands| -> [f64; 3] {
@@ -219,13 +277,11 @@ impl Column {
         };
         match source {
             Source::Piece(piece, triangle) => {
-                let stretched = ((u - below) / share).clamp(0.0, 1.0 - 1e-9);
                 let (target, weight) = sample_piece(piece, &place, stretched, f64::from(v));
                 if weight <= 0.0 {
                     return None;
                 }
-                let given =
-                    if piece.varied { emission_at(world, piece, *triangle, target.point) } else { piece.exitance };
+                let given = self.given(world, piece, *triangle, target.point);
                 let ray = between(world, &place, &target);
                 Some(Sample { ray, light: lit(weight / share, given), salt })
             }

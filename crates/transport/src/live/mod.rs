@@ -40,7 +40,7 @@ mod world;
 pub use air::Arrival;
 pub use body::{Body, Bounds, Shape, Site};
 pub use chunk::{Chunk, NEAR_RAYS, Part, Target};
-pub use column::{Column, Lamp};
+pub use column::{Column, Lamp, Spot};
 pub use gather::Lanes;
 pub use world::{REACH, World};
 
