@@ -278,10 +278,10 @@ impl Session {
 
     /// At corners of elements that might be cut for the same lamp and are not nothing more counts.
     fn join(&self, cuts: &mut BTreeMap<Key, Cut>) {
-        let mut cut: BTreeMap<(usize, usize), BTreeSet<u32>> = BTreeMap::new();
+        let mut cut: BTreeMap<(usize, usize), Vec<u32>> = BTreeMap::new();
         for ((object, element), own) in &*cuts {
             for (strand, _) in &own.strands {
-                cut.entry((*object, *strand)).or_default().insert(*element);
+                cut.entry((*object, *strand)).or_default().push(*element);
             }
         }
         cuts.par_iter_mut().for_each(|((object, element), own)| {
@@ -289,7 +289,9 @@ impl Session {
             for (strand, found) in &mut own.strands {
                 let cut = &cut[&(*object, *strand)];
                 let is_done = |element: u32| {
-                    cut.contains(&element) || is_buried(element) || self.is_left_out(*strand, (*object, element))
+                    cut.binary_search(&element).is_ok()
+                        || is_buried(element)
+                        || self.is_left_out(*strand, (*object, element))
                 };
                 let (spots, more) = (display.spots(*element), corners(own.parts, &found.more));
                 found.less = [0, 1, 2].map(|k| {
@@ -352,12 +354,10 @@ impl Session {
 
     /// What a strand brings directly to the elements of an object, and the share of shadow rays that came through.
     fn of_column(&self, object: usize, strand: usize) -> impl Fn(u32) -> (Bands, f32) {
-        let (column, chunks) = (self.strands[strand].column, self.chunks_of(object));
+        let column = self.strands[strand].column;
         move |element| {
-            let Some(column) = column else { return ([0.0; 3], 1.0) };
-            let chunk = &chunks[chunks.partition_point(|chunk| chunk.first <= element) - 1];
-            let e = (element - chunk.first) as usize;
-            (chunk.light(column, e), chunk.clear_share(column, e))
+            let found = column.zip(self.live.element(object, element));
+            found.map_or(([0.0; 3], 1.0), |(column, (chunk, e))| (chunk.light(column, e), chunk.clear_share(column, e)))
         }
     }
 

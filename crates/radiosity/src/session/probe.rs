@@ -4,7 +4,7 @@ use super::display::Weights;
 use super::model::LightKind;
 use super::{Display, Kept, Layer, LightId, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Session, display};
 use radiosity_scene::{Bands, PointLightKind, Projection, luminance};
-use radiosity_transport::live::{Chunk, Lanes};
+use radiosity_transport::live::Lanes;
 use std::sync::Arc;
 
 /// Bounces that are told apart; later ones show the last.
@@ -192,11 +192,7 @@ impl Session {
 
     /// Whether elements of an object are covered by others.
     pub(super) fn buried(&self, object: usize) -> impl Fn(u32) -> bool {
-        let chunks = self.chunks_of(object);
-        move |element| {
-            let place = chunks.partition_point(|chunk| chunk.first <= element).saturating_sub(1);
-            chunks.get(place).is_some_and(|chunk| chunk.is_buried((element - chunk.first) as usize))
-        }
+        move |element| self.live.element(object, element).is_some_and(|(chunk, e)| chunk.is_buried(e))
     }
 
     /// By what the light at the vertices of an object is averaged in the state that is shown: found once for all its layers.
@@ -228,22 +224,8 @@ impl Session {
     /// The area of each element of an object that is not buried in other objects, m², as far as rays have shown.
     pub fn exposed_areas(&self, object: ObjectId) -> Vec<f64> {
         let Some(body) = self.live.world().bodies.get(object.0 as usize) else { return Vec::new() };
-        let chunks = self.chunks_of(object.0 as usize).iter();
-        let elements = chunks.flat_map(|chunk| (0..chunk.len).map(move |e| (chunk.first + e as u32, chunk.exposed(e))));
-        elements.map(|(element, share)| body.area(element) * f64::from(share)).collect()
-    }
-
-    pub(super) fn chunks_of(&self, body: usize) -> &[Chunk] {
-        let chunks = self.live.chunks();
-        let [from, to] = [body, body + 1].map(|body| chunks.partition_point(|chunk| chunk.body < body));
-        &chunks[from..to]
-    }
-
-    fn element(&self, object: ObjectId, triangle: u32) -> Option<(&Chunk, usize)> {
-        let chunks = self.chunks_of(object.0 as usize);
-        let place = chunks.partition_point(|chunk| chunk.first <= triangle).checked_sub(1)?;
-        let element = (triangle - chunks[place].first) as usize;
-        (element < chunks[place].len).then_some((&chunks[place], element))
+        let share = |element| self.live.element(object.0 as usize, element).map_or(0.0, |(chunk, e)| chunk.exposed(e));
+        (0..body.elements()).map(|element| body.area(element) * f64::from(share(element))).collect()
     }
 
     /// Whether [`Session::light`] can tell a layer. While an edit is not seen, lamps, paint and rays are those of a scene whose light
@@ -384,7 +366,7 @@ impl Session {
     /// The rays of the element that is such a triangle: origin and end, or a point as far as the scene is wide for
     /// those that escape.
     pub fn rays(&self, object: ObjectId, triangle: u32) -> Vec<[[f32; 3]; 2]> {
-        let Some((chunk, element)) = self.element(object, triangle) else { return Vec::new() };
+        let Some((chunk, element)) = self.live.element(object.0 as usize, triangle) else { return Vec::new() };
         let world = self.live.world();
         if !world.bodies[object.0 as usize].is_present {
             return Vec::new();

@@ -72,6 +72,8 @@ pub struct Live {
     world: World,
     columns: Vec<Column>,
     chunks: Vec<Chunk>,
+    /// First chunk of each object.
+    starts: Vec<usize>,
     changes: Vec<Change>,
     /// So many changes may gather before those that nobody needs are looked for.
     room: usize,
@@ -95,6 +97,7 @@ impl Live {
             world,
             columns: Vec::new(),
             chunks: Vec::new(),
+            starts: Vec::new(),
             changes: Vec::new(),
             room: LEAST_ROOM,
             strata: [most.near(), most].map(|target| Strata::new(target.rays)),
@@ -131,6 +134,14 @@ impl Live {
         &self.chunks
     }
 
+    /// An element of an object: where its rays are, and which there it is. None where the object has not as many.
+    #[inline]
+    pub fn element(&self, body: usize, element: u32) -> Option<(&Chunk, usize)> {
+        let chunk = self.chunks.get(*self.starts.get(body)? + (element / CHUNK) as usize)?;
+        let e = (element % CHUNK) as usize;
+        (chunk.body == body && e < chunk.len).then_some((chunk, e))
+    }
+
     /// Number of ids.
     pub fn ids(&self) -> usize {
         self.world.ids()
@@ -156,6 +167,7 @@ impl Live {
         let mut parts = Vec::new();
         for body in bodies {
             let n = self.world.bodies[body].elements();
+            self.starts.push(self.chunks.len() + parts.len());
             parts.extend((0..n).step_by(CHUNK as usize).map(|first| (body, first, CHUNK.min(n - first))));
             self.is_dark.extend(std::iter::repeat_n(false, n as usize));
             self.is_dark.push(true);
