@@ -1,6 +1,7 @@
 // Elements in which light has an edge: drawn again over the whole ones, cut into parts whose corners have light of their own.
 import { DataUtils } from 'three';
 import type { Batches } from './batch';
+import { unbordered } from './border';
 import { Surface } from './surface';
 import type { CutsFrame, MeshFrame } from './wire';
 
@@ -74,7 +75,7 @@ class CutElements extends Surface {
     }
     const mesh: MeshFrame = { object: whole.object, positions: values[0].to, uvs: values[1].to, colours: values[2].to, indices };
     // The whole ones beneath reach beyond borders already.
-    super(whole.object, mesh, new Float32Array(3 * places));
+    super(whole.object, mesh, unbordered(places));
     values[3].to.forEach((lux, k) => { this.light.array[k] = DataUtils.toHalfFloat(lux); });
     this.firsts = firsts;
     this.look = whole.look;

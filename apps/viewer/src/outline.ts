@@ -21,10 +21,9 @@ export class Outline {
     uniforms: { pixels: shared.pixels },
     vertexShader: /* glsl */ `
       ${WIDEN}
-      in vec3 outward;
       void main() {
         mat4 placed = projectionMatrix * modelViewMatrix;
-        gl_Position = widened(placed * vec4(position, 1.0), placed * vec4(outward, 0.0));
+        gl_Position = widened(placed * vec4(position, 1.0), placed);
       }`,
     fragmentShader: /* glsl */ `
       precision highp float;

@@ -4,7 +4,7 @@ import {
   type IUniform,
 } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
-import { outwards, WIDEN } from './border';
+import { bordersOf, WIDEN } from './border';
 import { kept, numberOf, TONE_MAP } from './curve';
 import { WEIGHTS } from './luminance';
 import { LEVELS, PALETTE } from './scale';
@@ -43,7 +43,6 @@ export const VERTEX = /* glsl */ `
   ${WIDEN}
   in vec3 light;
   in vec3 paint;
-  in vec3 outward;
   uniform highp sampler2D looks;
   // Read where the surface is within the pixel: in the middle of a pixel that it only touches they would be far from what it has.
   centroid out vec3 vLight;
@@ -65,7 +64,7 @@ export const VERTEX = /* glsl */ `
     vLight = light * ${UNIT.toFixed(1)};
     vUv = uv;
     mat4 placed = projectionMatrix * modelViewMatrix * batchingMatrix;
-    gl_Position = widened(placed * vec4(position, 1.0), placed * vec4(outward, 0.0));
+    gl_Position = widened(placed * vec4(position, 1.0), placed);
   }
 `;
 
@@ -179,12 +178,13 @@ export class Surface extends Mesh<BufferGeometry, MeshBasicMaterial> {
   /** Its tree of boxes, once a ray needed it. */
   private boxes: MeshBVH | null = null;
 
-  constructor(readonly object: number, frame: MeshFrame, outward = outwards(frame.positions, frame.indices)) {
+  constructor(readonly object: number, frame: MeshFrame, borders = bordersOf(frame.positions, frame.indices)) {
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(frame.positions, 3));
     geometry.setAttribute('uv', new BufferAttribute(frame.uvs ?? new Float32Array((2 * frame.positions.length) / 3), 2));
     geometry.setAttribute('paint', new BufferAttribute(frame.colours ?? new Float32Array(frame.positions.length).fill(1), 3));
-    geometry.setAttribute('outward', new BufferAttribute(outward, 3));
+    geometry.setAttribute('before', new BufferAttribute(borders.before, 3, true));
+    geometry.setAttribute('after', new BufferAttribute(borders.after, 3, true));
     geometry.setIndex(new BufferAttribute(frame.indices, 1));
     const light = new Float16BufferAttribute(new Uint16Array(frame.positions.length), 3);
     geometry.setAttribute('light', light);

@@ -1,5 +1,5 @@
 // A closed room as .obj whose walls are fans of triangles of many sizes, and so are cut into elements more or less finely: corners
-// of one lie on edges of others, within walls and between them.
+// of one lie on edges of others, within walls and between them. The ceiling is strips around a panel, whose corners lie so, too.
 const [WIDTH, HEIGHT, DEPTH] = [4.3, 2.9, 5.7];
 
 /** Turned, so that no coordinate is a round number. */
@@ -27,11 +27,23 @@ export function room() {
   let count = 0;
   Object.entries(walls).forEach(([name, [from, along, up]], wall) => {
     const at = (u, v) => placed(corner(...from.map((x, k) => x + u * along[k] + v * up[k])));
+    if (name === 'ceiling') return;
     // Around, with a corner more on one side; the hub is near a corner, so that triangles are of many sizes.
     const border = [[0, 0], [0.31, 0], [1, 0], [1, 1], [0, 1]];
     lines.push(`o ${name}`, ...[[0.13 + 0.05 * wall, 0.83], ...border].map(([u, v]) => `v ${at(u, v).join(' ')}`));
     border.forEach((_, i) => lines.push(`f ${count + 1} ${count + 2 + i} ${count + 2 + ((i + 1) % border.length)}`));
     count += 1 + border.length;
   });
+  const [from, along, up] = walls.ceiling;
+  const quad = ([u, v, width, height]) => {
+    const corners = [[u, v], [u + width, v], [u + width, v + height], [u, v + height]];
+    lines.push(...corners.map(([u, v]) => `v ${placed(corner(...from.map((x, k) => x + u * along[k] + v * up[k]))).join(' ')}`));
+    lines.push(`f ${[1, 2, 3, 4].map((k) => count + k).join(' ')}`);
+    count += 4;
+  };
+  lines.push('o ceiling');
+  for (const strip of [[0, 0, 1, 0.13], [0, 0.13, 0.31, 0.09], [0.57, 0.13, 0.43, 0.09], [0, 0.22, 1, 0.61], [0, 0.83, 1, 0.17]]) quad(strip);
+  lines.push('o panel');
+  quad([0.31, 0.13, 0.26, 0.09]);
   return lines.join('\n');
 }

@@ -37,9 +37,9 @@ const SOFT_PARTS: u32 = 8;
 /// Spots of a lamp with area that a place has shadow rays to. With half as many those behind bars of windows were seen on walls.
 const SPOTS: usize = 128;
 
-/// Parts by which it is seen whether there is an edge where there would be many; as each place looks around itself, next to nothing falls
-/// between.
-const PROBE: u32 = 6;
+/// How many times as large parts are by which it is seen whether there is an edge; as each place looks around itself, next to nothing
+/// falls between.
+const COARSER: u32 = 2;
 
 /// Least difference among neighbours that is looked after, over the light there: half as much is hard to see beside the noise.
 const LEAST_CONTRAST: f32 = 0.15;
@@ -54,15 +54,15 @@ const EVEN: f32 = 0.05;
 const LOOKED_AT: usize = 4;
 
 /// Where around a place light is looked for, in widths of a part: two squares, turned and of different sizes, so that no two are in a row
-/// along an edge, and as far as half way to the next places. With one alone edges are stairs; these make them a part wide.
+/// along an edge, and as far as half way to the next places; opposite ones after each other. With one alone edges are stairs; these make them a part wide.
 const FOOTPRINT: [[f32; 2]; 8] = [
     [-0.1875, -0.5625],
-    [0.5625, -0.1875],
     [0.1875, 0.5625],
+    [0.5625, -0.1875],
     [-0.5625, 0.1875],
     [-0.5, -0.1],
-    [0.1, -0.5],
     [0.5, 0.1],
+    [0.1, -0.5],
     [-0.1, 0.5],
 ];
 
@@ -85,8 +85,15 @@ const GRAZING: f64 = 0.3;
 /// An element of an object.
 type Key = (usize, u32);
 
-/// A strand's light on an element, cut into parts.
-type Sample = (Key, usize, u32);
+/// Parts of a side of an element at which light is looked for, and into which it is cut if it has an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Parts {
+    looked: u32,
+    cut: u32,
+}
+
+/// A strand's light at the places of an element.
+type Sample = (Key, usize, Parts);
 
 /// An element among whose neighbours light differs.
 struct Wanted {
@@ -197,8 +204,13 @@ fn is_even(parts: u32, known: &[Bands], tolerance: f32) -> bool {
 
 impl Wanted {
     /// Parts by which it is seen whether there is an edge.
-    fn probe(&self) -> u32 {
-        if self.parts <= SOFT_PARTS { self.parts } else { PROBE }
+    fn probe(&self) -> Parts {
+        Parts { looked: self.parts.div_ceil(COARSER).max(self.parts.min(2)), cut: self.parts }
+    }
+
+    /// Parts that it is cut into if there is one.
+    fn cut(&self) -> Parts {
+        Parts { looked: self.parts, cut: self.parts }
     }
 }
 
@@ -206,7 +218,7 @@ impl Edges {
     /// Of elements that are wanted, samples that are not there yet: those of an object together.
     fn missing(&self, wanted: &[Wanted]) -> Vec<Sample> {
         let of = |wanted: &Wanted| -> Vec<Sample> {
-            let parts = if self.has_edge(wanted) { wanted.parts } else { wanted.probe() };
+            let parts = if self.has_edge(wanted) { wanted.cut() } else { wanted.probe() };
             wanted.strands.iter().map(|(strand, _)| (wanted.key, *strand, parts)).collect()
         };
         let mut missing: Vec<Sample> =
@@ -220,7 +232,7 @@ impl Edges {
         let probe = wanted.probe();
         wanted.strands.iter().any(|(strand, tolerance)| {
             let found = self.samples.get(&(wanted.key, *strand, probe));
-            found.is_some_and(|found| !is_even(probe, &found.more, *tolerance))
+            found.is_some_and(|found| !is_even(probe.looked, &found.more, *tolerance))
         })
     }
 
@@ -230,14 +242,14 @@ impl Edges {
         let mut count = 0;
         for one in wanted {
             let has_edge = self.has_edge(one);
-            let (from, parts) = if has_edge { (one.parts, one.parts) } else { (one.probe(), 1) };
+            let (from, parts) = if has_edge { (one.cut(), one.parts) } else { (one.probe(), 1) };
             count += places_of(parts);
             if count > most {
                 break;
             }
             let of = |(strand, _): &(usize, f32)| {
                 let found = self.samples.get(&(one.key, *strand, from))?;
-                let more = if has_edge { found.more.clone() } else { corners(from, &found.more).to_vec() };
+                let more = if has_edge { found.more.clone() } else { corners(from.looked, &found.more).to_vec() };
                 Some((*strand, Found { more, ..*found }))
             };
             cuts.insert(one.key, Cut { parts, strands: one.strands.iter().filter_map(of).collect() });
@@ -440,40 +452,41 @@ impl Session {
 
     /// The light of a strand at the places of an element.
     fn sample(&self, (key, strand, parts): Sample) -> Found {
+        let places = || places(parts.looked);
         let corners = self.corners(key, strand);
         let Some(column) = self.strands[strand].column else {
-            return Found { corners, more: vec![[0.0; 3]; places_of(parts)], less: [[0.0; 3]; 3] };
+            return Found { corners, more: vec![[0.0; 3]; places().count()], less: [[0.0; 3]; 3] };
         };
         let world = self.live.world();
         let (body, display) = (&world.bodies[key.0], self.display(key.0));
         let turned = DMat3::from_mat4(DMat4::from(body.matrix)).inverse().transpose();
         // Of neighbours in one plane both look at what is on either side.
         let is_inside = display.is_inside(key.1);
-        // Each place of the footprint has some of the spots.
         let spots = self.live.spots(column, SPOTS);
-        let share = spots.len() / FOOTPRINT.len();
-        let found = |k: usize, [v, w]: [f32; 2]| {
+        let facing = |[v, w]: [f32; 2]| {
             let inwards = |x: f32| x + INWARDS * (1.0 / 3.0 - x);
             let (at, flat) = body.facing(key.1, [inwards(v), inwards(w)]);
             let smooth = (turned * display.normal(key.1, [v, w])).normalize_or_zero();
             let normal = if smooth.dot(flat) > 0.0 { smooth } else { flat };
-            self.live.receive_from(column, (at + world.middle, normal), &spots[k * share..(k + 1) * share])
+            (at + world.middle, normal)
         };
         let more = |[v, w]: [f32; 2]| {
-            let mut sum = [0f32; 3];
-            for (k, [x, y]) in FOOTPRINT.into_iter().enumerate() {
-                let mut place = [v + x / parts as f32, w + y / parts as f32];
+            // What is kept of an element that is not cut are its corners, as they are where it is.
+            let is_corner = [v, w, 1.0 - v - w].contains(&1.0);
+            let width = 1.0 / if is_corner { parts.cut } else { parts.looked } as f32;
+            let around = FOOTPRINT.map(|[x, y]| {
+                let mut place = [v + width * x, w + width * y];
                 if !is_inside {
                     place = place.map(|x| x.max(0.0));
                     place = place.map(|x| x / (place[0] + place[1]).max(1.0));
                 }
-                let found = found(k, place);
-                (0..3).for_each(|band| sum[band] += found[band] / FOOTPRINT.len() as f32);
-            }
+                facing(place)
+            });
+            let found = self.live.receive_around(column, &around, &spots);
             let shown = between(1, &corners, [v, w]);
-            std::array::from_fn(|band| sum[band] - shown[band])
+            std::array::from_fn(|band| found[band] - shown[band])
         };
-        Found { corners, more: places(parts).map(more).collect(), less: [[0.0; 3]; 3] }
+        Found { corners, more: places().map(more).collect(), less: [[0.0; 3]; 3] }
     }
 
     /// Elements of an object that are cut for display where light has an edge, and into how many parts along each side. None for an

@@ -8,6 +8,10 @@ use glam::DVec3;
 use radiosity_scene::Bands;
 use radiosity_trace::sampling::{Sequence, frame, hash};
 
+/// Places around one another that are looked from before others are taken to see as much of a lamp: with 32 spots in all, what hides less
+/// than a thirtieth of it may be missed.
+const PILOTS: usize = 2;
+
 /// What arrives at a point.
 #[derive(Clone, Debug)]
 pub struct Arrival {
@@ -101,30 +105,45 @@ impl Live {
         !self.columns[column].is_empty() && self.columns[column].strength.len() == 1
     }
 
-    /// Spots of a column's lamp, as many in all, for [`Live::receive_from`]; one without area has none.
+    /// Spots of a column's lamp, as many in all, for [`Live::receive_around`]; one without area has none.
     pub fn spots(&self, column: usize, count: usize) -> Vec<Spot> {
         self.columns[column].spots(&self.world, count)
     }
 
-    /// What a column brings straight to a point of the world with a unit normal, lux per band: a lamp without area, or some of the
-    /// spots of one with area, each as if all of the lamp's light came from it. From the same spots, neighbours differ by what stands
-    /// between them and these, and by no noise.
-    pub fn receive_from(&self, column: usize, (point, normal): (DVec3, DVec3), spots: &[Spot]) -> Bands {
-        let site = Site::in_the_air(point - self.world.middle, normal);
+    /// What a column brings straight to places of the world around one another, on the mean, lux per band; each is a point with a unit normal.
+    /// Of a lamp with area each has as many spots, as if all of its light came from them: from the same spots, neighbours differ by what
+    /// stands between them and these, and by no noise. Where the first [`PILOTS`] places have either all of theirs in sight or none, so have the others.
+    pub fn receive_around(&self, column: usize, places: &[(DVec3, DVec3)], spots: &[Spot]) -> Bands {
         let column = &self.columns[column];
-        if column.is_certain() {
-            return self.direct(column, &site, 0, 1)[0].map(|x| x as f32);
-        }
+        let site = |(point, normal): (DVec3, DVec3)| Site::in_the_air(point - self.world.middle, normal);
         let (sequence, mut sum) = (column.sequence(0), [0f64; 3]);
-        let is_near = spots.iter().any(|spot| spot.is_near(site.centre));
-        for spot in spots {
-            let sample = if is_near {
-                column.sample(&self.world, &site, (0, &sequence), spot.index)
-            } else {
-                spot.seen_from(&self.world, &site)
-            };
-            if let Some(sample) = sample.filter(|sample| !self.world.blocked(&sample.ray, sample.salt)) {
-                (0..3).for_each(|band| sum[band] += sample.light[band] / spots.len() as f64);
+        let mut add = |light: [f64; 3]| (0..3).for_each(|band| sum[band] += light[band] / places.len() as f64);
+        if column.is_certain() {
+            places.iter().for_each(|place| add(self.direct(column, &site(*place), 0, 1)[0]));
+            return sum.map(|x| x as f32);
+        }
+        let share = spots.len() / places.len();
+        let (mut seen, mut hidden) = (0, 0);
+        for (k, (place, spots)) in places.iter().zip(spots.chunks(share.max(1))).enumerate() {
+            if k == PILOTS && seen == 0 {
+                break;
+            }
+            let is_clear = k >= PILOTS && hidden == 0;
+            let site = site(*place);
+            let is_near = spots.iter().any(|spot| spot.is_near(site.centre));
+            for spot in spots {
+                let sample = if is_near {
+                    column.sample(&self.world, &site, (0, &sequence), spot.index)
+                } else {
+                    spot.seen_from(&self.world, &site)
+                };
+                let Some(sample) = sample else { continue };
+                if !is_clear && self.world.blocked(&sample.ray, sample.salt) {
+                    hidden += 1;
+                } else {
+                    seen += 1;
+                    add(sample.light.map(|light| light / spots.len() as f64));
+                }
             }
         }
         sum.map(|x| x as f32)
@@ -213,12 +232,12 @@ mod tests {
             4000.0 * c * c.atan()
         };
         for height in [0.2, 1.0, 3.0, 10.0] {
-            let found = live.receive_from(column, (DVec3::Z * (3.0 - height), DVec3::Z), &spots);
+            let found = live.receive_around(column, &[(DVec3::Z * (3.0 - height), DVec3::Z)], &spots);
             assert!((f64::from(found[1]) / exact(height) - 1.0).abs() < 0.01, "{height}: {found:?}");
         }
         // The sheet's edge is above the point, from x = 0 on.
         live.place(1, glam::DAffine3::from_translation(DVec3::new(-36.0, 0.0, 0.0)));
-        let half = live.receive_from(column, (DVec3::ZERO, DVec3::Z), &spots);
+        let half = live.receive_around(column, &[(DVec3::ZERO, DVec3::Z)], &spots);
         assert!((f64::from(half[1]) / exact(3.0) - 0.5).abs() < 0.01, "{half:?}");
     }
 }
