@@ -27,6 +27,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::{PI, TAU};
 use std::time::Instant;
 
+/// Fewest spots of a lamp with area that some place of a lit element sees, by which it is cut: of lamps in many rooms that are one object
+/// each room may see next to none.
+const LEAST_SEEN: usize = 16;
+
 /// Parts of a side of elements as wide as they may be, in which there is an edge. With 24 edges are finer, and take more than twice as
 /// many places: of as many as there may be, tables in the sun went without.
 const PARTS: u32 = 16;
@@ -39,12 +43,12 @@ const SPOTS: usize = 128;
 
 /// How many times as large parts are by which it is seen whether there is an edge; as each place looks around itself, next to nothing
 /// falls between.
-const COARSER: u32 = 2;
+const COARSER: u32 = 3;
 
 /// Least difference among neighbours that is looked after, over the light there: half as much is hard to see beside the noise.
 const LEAST_CONTRAST: f32 = 0.15;
 
-/// Least part of that by one lamp.
+/// Least part of that by one lamp: of a dozen that light a place each may have as little.
 const LEAST_OF_ONE: f32 = 0.03;
 
 /// What light may differ by from one that runs evenly over an element, over the light there, before the element is cut.
@@ -75,7 +79,7 @@ const INWARDS: f32 = 1e-3;
 /// Least cosine between the normals of a facet and of its corners, 3°: beyond, a body is rounded.
 const FLAT: f32 = 0.9986;
 
-/// Least cosine between the normals of elements in one plane.
+/// Least cosine between the normals of elements in one plane, 0.26°: of a wall that is turned by rounding.
 const IN_PLANE: f32 = 0.99999;
 
 /// Least cosine at which a lamp shines on facets of rounded bodies that are cut: next facets that are turned by up to 17° are in the
@@ -159,7 +163,8 @@ pub struct Edges {
 
 /// Bytes that so many places take, with what is looked at to find them.
 pub fn bytes(places: usize) -> usize {
-    (2 * LOOKED_AT + 1) * places * size_of::<Bands>()
+    // Looked at coarsely and finely, in use, and in use before.
+    (3 * LOOKED_AT + 2) * places * size_of::<Bands>()
 }
 
 /// How many places an element of so many parts has.
@@ -454,9 +459,8 @@ impl Session {
     fn sample(&self, (key, strand, parts): Sample) -> Found {
         let places = || places(parts.looked);
         let corners = self.corners(key, strand);
-        let Some(column) = self.strands[strand].column else {
-            return Found { corners, more: vec![[0.0; 3]; places().count()], less: [[0.0; 3]; 3] };
-        };
+        let as_shown = || Found { corners, more: vec![[0.0; 3]; places().count()], less: [[0.0; 3]; 3] };
+        let Some(column) = self.strands[strand].column else { return as_shown() };
         let world = self.live.world();
         let (body, display) = (&world.bodies[key.0], self.display(key.0));
         let turned = DMat3::from_mat4(DMat4::from(body.matrix)).inverse().transpose();
@@ -482,11 +486,16 @@ impl Session {
                 }
                 facing(place)
             });
-            let found = self.live.receive_around(column, &around, &spots);
+            let (found, seen) = self.live.receive_around(column, &around, &spots);
             let shown = between(1, &corners, [v, w]);
-            std::array::from_fn(|band| found[band] - shown[band])
+            (std::array::from_fn(|band| found[band] - shown[band]), seen)
         };
-        Found { corners, more: places().map(more).collect(), less: [[0.0; 3]; 3] }
+        let (more, seen): (Vec<Bands>, Vec<usize>) = places().map(more).unzip();
+        let is_lit = luminance(self.of_column(key.0, strand)(key.1).0) > 0.0;
+        if is_lit && !self.is_certain(strand) && seen.into_iter().all(|seen| seen < LEAST_SEEN) {
+            return as_shown();
+        }
+        Found { corners, more, less: [[0.0; 3]; 3] }
     }
 
     /// Elements of an object that are cut for display where light has an edge, and into how many parts along each side. None for an

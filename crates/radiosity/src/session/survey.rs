@@ -27,7 +27,8 @@ const MOST_SHADOWS: u32 = 256;
 /// Places across and down a picture: their mean is known to a tenth of itself.
 const SIGHT: [u32; 2] = [16, 10];
 
-/// Light of a place over that of the brightest, up to which it is what rounding has left.
+/// Light of a place over that of the brightest, up to which it is what rounding of single precision may have left; beside the sun's patch nobody
+/// sees as little.
 const ROUNDING: f32 = 1e-6;
 
 /// A place on an object.

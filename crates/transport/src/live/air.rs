@@ -8,9 +8,9 @@ use glam::DVec3;
 use radiosity_scene::Bands;
 use radiosity_trace::sampling::{Sequence, frame, hash};
 
-/// Places around one another that are looked from before others are taken to see as much of a lamp: with 32 spots in all, what hides less
-/// than a thirtieth of it may be missed.
-const PILOTS: usize = 2;
+/// Places around one another that are looked from before others are taken to see as much of a lamp: half of eight, as of two the line through
+/// them may be the edge of a shadow.
+const PILOTS: usize = 4;
 
 /// What arrives at a point.
 #[derive(Clone, Debug)]
@@ -92,12 +92,9 @@ impl Live {
         !self.columns[column].is_empty() && self.columns[column].is_certain()
     }
 
-    /// The cosine at which the lamp of a column that is certain shines on a point of the world with a unit normal; 0 from behind.
+    /// The cosine at which the lamp of a column shines on a point of the world with a unit normal, from the middle of it where it has area; 0 from behind.
     pub fn cosine_from(&self, column: usize, (point, normal): (DVec3, DVec3)) -> f64 {
-        let column = &self.columns[column];
-        let site = Site::in_the_air(point - self.world.middle, normal);
-        let sample = column.sample(&self.world, &site, (0, &column.sequence(0)), 0);
-        sample.map_or(0.0, |sample| sample.ray.direction.as_dvec3().dot(normal).max(0.0))
+        self.columns[column].cosine(&Site::in_the_air(point - self.world.middle, normal))
     }
 
     /// Whether a column is one lamp's alone.
@@ -110,43 +107,49 @@ impl Live {
         self.columns[column].spots(&self.world, count)
     }
 
-    /// What a column brings straight to places of the world around one another, on the mean, lux per band; each is a point with a unit normal.
-    /// Of a lamp with area each has as many spots, as if all of its light came from them: from the same spots, neighbours differ by what
-    /// stands between them and these, and by no noise. Where the first [`PILOTS`] places have either all of theirs in sight or none, so have the others.
-    pub fn receive_around(&self, column: usize, places: &[(DVec3, DVec3)], spots: &[Spot]) -> Bands {
+    /// What a column brings straight to places of the world around one another, on the mean, lux per band, and how many of the spots of a
+    /// lamp with area they see; each is a point with a unit normal. They share the spots out among themselves, each with those it has as if all light
+    /// came from them: from the same spots, neighbours differ by what stands between them and these, and by no noise. Nearby, where one would
+    /// see that the lamp is made of spots, each place draws its own, as shadow rays do. Where the first few places have either all of
+    /// theirs in sight or none, so have the others.
+    pub fn receive_around(&self, column: usize, places: &[(DVec3, DVec3)], spots: &[Spot]) -> (Bands, usize) {
         let column = &self.columns[column];
         let site = |(point, normal): (DVec3, DVec3)| Site::in_the_air(point - self.world.middle, normal);
-        let (sequence, mut sum) = (column.sequence(0), [0f64; 3]);
+        let mut sum = [0f64; 3];
         let mut add = |light: [f64; 3]| (0..3).for_each(|band| sum[band] += light[band] / places.len() as f64);
         if column.is_certain() {
             places.iter().for_each(|place| add(self.direct(column, &site(*place), 0, 1)[0]));
-            return sum.map(|x| x as f32);
+            return (sum.map(|x| x as f32), 0);
         }
-        let share = spots.len() / places.len();
+        let (sequence, share) = (column.sequence(0), (spots.len() / places.len()).max(1));
+        let is_near = places.first().is_some_and(|(point, _)| {
+            let point = *point - self.world.middle;
+            spots.iter().any(|spot| spot.is_near(point, places.len()))
+        });
         let (mut seen, mut hidden) = (0, 0);
-        for (k, (place, spots)) in places.iter().zip(spots.chunks(share.max(1))).enumerate() {
-            if k == PILOTS && seen == 0 {
+        for (k, (place, own)) in places.iter().zip(spots.chunks(share)).enumerate() {
+            // Of fewer that face them nothing follows.
+            let is_known = k >= PILOTS && seen + hidden >= share;
+            if is_known && seen == 0 {
                 break;
             }
-            let is_clear = k >= PILOTS && hidden == 0;
-            let site = site(*place);
-            let is_near = spots.iter().any(|spot| spot.is_near(site.centre));
-            for spot in spots {
+            let (site, is_clear) = (site(*place), is_known && hidden == 0);
+            for spot in own {
                 let sample = if is_near {
                     column.sample(&self.world, &site, (0, &sequence), spot.index)
                 } else {
-                    spot.seen_from(&self.world, &site)
+                    spot.seen_from(&self.world, &site.place(0.0, 0.0))
                 };
                 let Some(sample) = sample else { continue };
                 if !is_clear && self.world.blocked(&sample.ray, sample.salt) {
                     hidden += 1;
                 } else {
                     seen += 1;
-                    add(sample.light.map(|light| light / spots.len() as f64));
+                    add(sample.light.map(|light| light / own.len() as f64));
                 }
             }
         }
-        sum.map(|x| x as f32)
+        (sum.map(|x| x as f32), seen)
     }
 
     /// What a column brings straight to a place, by the halves of its rays.
@@ -232,12 +235,32 @@ mod tests {
             4000.0 * c * c.atan()
         };
         for height in [0.2, 1.0, 3.0, 10.0] {
-            let found = live.receive_around(column, &[(DVec3::Z * (3.0 - height), DVec3::Z)], &spots);
+            let (found, _) = live.receive_around(column, &[(DVec3::Z * (3.0 - height), DVec3::Z)], &spots);
             assert!((f64::from(found[1]) / exact(height) - 1.0).abs() < 0.01, "{height}: {found:?}");
         }
         // The sheet's edge is above the point, from x = 0 on.
         live.place(1, glam::DAffine3::from_translation(DVec3::new(-36.0, 0.0, 0.0)));
-        let half = live.receive_around(column, &[(DVec3::ZERO, DVec3::Z)], &spots);
-        assert!((f64::from(half[1]) / exact(3.0) - 0.5).abs() < 0.01, "{half:?}");
+        let (half, seen) = live.receive_around(column, &[(DVec3::ZERO, DVec3::Z)], &spots);
+        assert!((f64::from(half[1]) / exact(3.0) - 0.5).abs() < 0.01 && seen == 128, "{half:?} of {seen}");
+
+        // Eight places share the spots; those that need not look find what they would.
+        let around = |middle: DVec3| {
+            [[-3., -9.], [3., 9.], [9., -3.], [-9., 3.], [-8., -2.], [8., 2.], [2., -8.], [-2., 8.]]
+                .map(|[x, y]| (middle + DVec3::new(x, y, 0.0) / 160.0, DVec3::Z))
+        };
+        for (x, seen) in [(-1.0, 256..=256), (0.0, 100..=156), (0.4, 1..=99), (3.0, 0..=0)] {
+            let places = around(DVec3::X * x);
+            let found = live.receive_around(column, &places, &spots);
+            let one_by_one = places.iter().zip(spots.chunks(32));
+            let mean =
+                one_by_one.map(|(place, own)| live.receive_around(column, &[*place], own).0[1] / 8.0).sum::<f32>();
+            assert!((found.0[1] - mean).abs() <= 1e-4 * mean && seen.contains(&found.1), "{x}: {found:?}, {mean}");
+        }
+        // Nearby light is as exact, shared out among places.
+        live.remove(1);
+        for height in [0.05, 0.1, 0.3] {
+            let (found, _) = live.receive_around(column, &around(DVec3::Z * (3.0 - height)), &spots);
+            assert!((f64::from(found[1]) / exact(height) - 1.0).abs() < 0.02, "{height}: {found:?}");
+        }
     }
 }
