@@ -25,19 +25,17 @@ export function room() {
   };
   const lines = [];
   let count = 0;
-  Object.entries(walls).forEach(([name, [from, along, up]], wall) => {
-    const at = (u, v) => placed(corner(...from.map((x, k) => x + u * along[k] + v * up[k])));
+  const on = ([from, along, up]) => ([u, v]) => `v ${placed(corner(...from.map((x, k) => x + u * along[k] + v * up[k]))).join(' ')}`;
+  Object.entries(walls).forEach(([name, sides], wall) => {
     if (name === 'ceiling') return;
     // Around, with a corner more on one side; the hub is near a corner, so that triangles are of many sizes.
     const border = [[0, 0], [0.31, 0], [1, 0], [1, 1], [0, 1]];
-    lines.push(`o ${name}`, ...[[0.13 + 0.05 * wall, 0.83], ...border].map(([u, v]) => `v ${at(u, v).join(' ')}`));
+    lines.push(`o ${name}`, ...[[0.13 + 0.05 * wall, 0.83], ...border].map(on(sides)));
     border.forEach((_, i) => lines.push(`f ${count + 1} ${count + 2 + i} ${count + 2 + ((i + 1) % border.length)}`));
     count += 1 + border.length;
   });
-  const [from, along, up] = walls.ceiling;
   const quad = ([u, v, width, height]) => {
-    const corners = [[u, v], [u + width, v], [u + width, v + height], [u, v + height]];
-    lines.push(...corners.map(([u, v]) => `v ${placed(corner(...from.map((x, k) => x + u * along[k] + v * up[k]))).join(' ')}`));
+    lines.push(...[[u, v], [u + width, v], [u + width, v + height], [u, v + height]].map(on(walls.ceiling)));
     lines.push(`f ${[1, 2, 3, 4].map((k) => count + k).join(' ')}`);
     count += 4;
   };
