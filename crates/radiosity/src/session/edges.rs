@@ -18,13 +18,12 @@
 //! light is one on both sides. After other edits elements stay cut at whose corners the lamp's light is what it was,
 //! until all are looked for again: an edge within that moved, and changed nothing at the corners, is where it was till then.
 
-use super::display::Display;
+use super::lattice::{between, corners, is_even, places, places_of};
 use super::{Layer, ObjectId, Session, Strand};
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4};
 use radiosity_scene::{Bands, luminance};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::f32::consts::{PI, TAU};
 use std::time::Instant;
 
 /// Fewest spots of a lamp with area that some place of a lit element sees, by which it is cut: of lamps in many rooms that are one object
@@ -75,12 +74,6 @@ const BATCH: usize = 64;
 
 /// How far places at the border of an element are moved towards its middle: beside a wall they would be in it.
 const INWARDS: f32 = 1e-3;
-
-/// Least cosine between the normals of a facet and of its corners, 3°: beyond, a body is rounded.
-const FLAT: f32 = 0.9986;
-
-/// Least cosine between the normals of elements in one plane, 0.26°: of a wall that is turned by rounding.
-const IN_PLANE: f32 = 0.99999;
 
 /// Least cosine at which a lamp shines on facets of rounded bodies that are cut: next facets that are turned by up to 17° are in the
 /// light then, too.
@@ -165,46 +158,6 @@ pub struct Edges {
 pub fn bytes(places: usize) -> usize {
     // Looked at coarsely and finely, in use, and in use before.
     (3 * LOOKED_AT + 2) * places * size_of::<Bands>()
-}
-
-/// How many places an element of so many parts has.
-fn places_of(parts: u32) -> usize {
-    ((parts + 1) * (parts + 2) / 2) as usize
-}
-
-/// Weights of the corners 1 and 2 of an element at its places, row by row.
-fn places(parts: u32) -> impl Iterator<Item = [f32; 2]> {
-    (0..=parts).flat_map(move |j| (0..=parts - j).map(move |i| [i, j].map(|k| k as f32 / parts as f32)))
-}
-
-/// What is at a place of an element between those that are known.
-fn between(parts: u32, known: &[Bands], [v, w]: [f32; 2]) -> Bands {
-    let n = parts as usize;
-    let at = |i: usize, j: usize| known[j * (n + 1) - j * j.saturating_sub(1) / 2 + i];
-    let [x, y] = [v, w].map(|x| x.clamp(0.0, 1.0) * n as f32);
-    let j = (y as usize).min(n - 1);
-    let i = (x as usize).min(n - 1 - j);
-    let (x, y) = (x - i as f32, y - j as f32);
-    // Of the two halves of a cell, the upper is not there at the slanting side.
-    let (first, weights) = if x + y <= 1.0 || i + j + 2 > n {
-        (at(i, j), [1.0 - x - y, x, y])
-    } else {
-        (at(i + 1, j + 1), [x + y - 1.0, 1.0 - y, 1.0 - x])
-    };
-    let others = [at(i + 1, j), at(i, j + 1)];
-    std::array::from_fn(|band| weights[0] * first[band] + weights[1] * others[0][band] + weights[2] * others[1][band])
-}
-
-/// What the corners of an element have.
-fn corners(parts: u32, known: &[Bands]) -> [Bands; 3] {
-    [known[0], known[parts as usize], known[known.len() - 1]]
-}
-
-/// Whether places have about what would run evenly between the corners.
-fn is_even(parts: u32, known: &[Bands], tolerance: f32) -> bool {
-    let corners = corners(parts, known);
-    let apart = |(uv, known): ([f32; 2], &Bands)| luminance(*known) - luminance(between(1, &corners, uv));
-    places(parts).zip(known).all(|place| apart(place).abs() <= tolerance)
 }
 
 impl Wanted {
@@ -543,91 +496,5 @@ impl Session {
             }
         }
         shown.map(|x| x.max(0.0))
-    }
-}
-
-impl Display {
-    /// Least and most around each element: of those that share a corner with it.
-    pub fn ranges(&self, of: impl Fn(u32) -> f32, is_buried: impl Fn(u32) -> bool) -> Vec<[f32; 2]> {
-        let spots = self.around_spots(|elements| {
-            let there = elements.iter().filter(|(element, _)| !is_buried(*element)).map(|(element, _)| of(*element));
-            there.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-        });
-        let of = |corners: &[u32]| {
-            let range = corners.iter().map(|corner| spots[self.spot_of(*corner)]);
-            range.fold([f32::INFINITY, 0.0], |[low, high]: [f32; 2], [a, b]| [low.min(a), high.max(b)])
-        };
-        self.indices.chunks_exact(3).map(of).map(|[low, high]| [low.min(high), high]).collect()
-    }
-
-    /// Whether an element is flat to the eye, too, and no facet of a rounded body.
-    fn is_flat(&self, element: u32) -> bool {
-        let (corners, flat) = (&self.indices[3 * element as usize..][..3], self.flat(element));
-        corners.iter().all(|corner| Vec3::from(self.normals[*corner as usize]).dot(flat) >= FLAT)
-    }
-
-    /// Whether an element has others in its plane on all sides.
-    fn is_inside(&self, element: u32) -> bool {
-        let normal = self.flat(element);
-        self.spots(element).into_iter().all(|spot| {
-            let angle = |(element, _): &(u32, f32)| {
-                if self.flat(*element).dot(normal) < IN_PLANE { 0.0 } else { self.angle_at(*element, spot) }
-            };
-            self.around(spot).iter().map(angle).sum::<f32>() > 0.999 * TAU
-        })
-    }
-
-    /// Unit normal of an element.
-    fn flat(&self, element: u32) -> Vec3 {
-        let [a, b, c] = self.places_of(element);
-        (b - a).cross(c - a).normalize_or_zero()
-    }
-
-    fn places_of(&self, element: u32) -> [Vec3; 3] {
-        [0, 1, 2].map(|k| Vec3::from(self.positions[self.indices[3 * element as usize + k] as usize]))
-    }
-
-    /// The angle of an element at one of its corners, or at a spot within an edge.
-    fn angle_at(&self, element: u32, spot: usize) -> f32 {
-        let places = self.places_of(element);
-        self.spots(element)
-            .iter()
-            .position(|own| *own == spot)
-            .map_or(PI, |k| (places[(k + 1) % 3] - places[k]).angle_between(places[(k + 2) % 3] - places[k]))
-    }
-
-    /// The normal at a place of an element, of any length.
-    pub fn normal(&self, element: u32, [v, w]: [f32; 2]) -> DVec3 {
-        let corners = &self.indices[3 * element as usize..][..3];
-        let [a, b, c] = [0, 1, 2].map(|k| Vec3::from(self.normals[corners[k] as usize]));
-        ((1.0 - v - w) * a + v * b + w * c).as_dvec3()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Places are told as they are, and what runs evenly between them is met everywhere.
-    #[test]
-    fn between_places_light_runs_evenly() {
-        let plane = |[v, w]: [f32; 2]| 1.0 + 2.0 * v - 3.0 * w;
-        for parts in [1, 2, 6, 7] {
-            let known: Vec<Bands> = places(parts).map(|uv| [plane(uv); 3]).collect();
-            assert_eq!(known.len(), places_of(parts));
-            assert!(is_even(parts, &known, 1e-5));
-            let others = (0..40).flat_map(|i| (0..=40 - i).map(move |j| [i as f32 / 41.0, j as f32 / 41.0]));
-            for uv in places(parts).chain(others) {
-                assert!((between(parts, &known, uv)[1] - plane(uv)).abs() < 1e-5, "{uv:?}");
-            }
-        }
-        let peak = places(6).position(|uv| uv == [0.5, 0.5]).unwrap();
-        let mut one = vec![[0.0; 3]; places_of(6)];
-        one[peak] = [1.0; 3];
-        assert!(!is_even(6, &one, 0.9));
-        for (place, uv) in places(6).enumerate() {
-            let wanted = if place == peak { 1.0 } else { 0.0 };
-            assert!((between(6, &one, uv)[0] - wanted).abs() < 1e-5, "{uv:?}");
-        }
     }
 }

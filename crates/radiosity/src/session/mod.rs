@@ -38,6 +38,7 @@ mod check;
 mod display;
 mod edges;
 mod edit;
+mod lattice;
 mod light;
 mod model;
 mod movable;
@@ -50,6 +51,7 @@ mod saved;
 mod seams;
 mod solve;
 mod state;
+mod surroundings;
 mod survey;
 
 pub use added::{Form, NewObject};
