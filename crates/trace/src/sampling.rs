@@ -87,31 +87,26 @@ impl Sequence {
         std::array::from_fn(|d| unit(owen(raw[d], self.seeds[d])))
     }
 
-    /// Where scrambling carries the `2^bits` equal intervals of [0, 1) in the first two dimensions (nested scrambling
-    /// permutes them): points that are not scrambled, those of [`strata`], lie in interval k where those of this sequence
-    /// lie in interval `[d][k]`. At most 5 bits.
-    pub fn intervals(&self, bits: u32) -> [[u8; 32]; 2] {
-        std::array::from_fn(|d| {
-            let mut to = [0; 32];
-            for (k, to) in to.iter_mut().enumerate().take(1 << bits) {
-                // None of the bits below has a say in the upper ones.
-                let x = if bits == 0 { 0 } else { (k as u32) << (32 - bits) };
-                *to = if bits == 0 { 0 } else { (owen(x, self.seeds[d]) >> (32 - bits)) as u8 };
+    /// The first two numbers of points `first`, `first + 1`, …: as [`Sequence::pair`], lane by lane.
+    #[inline(always)]
+    pub fn pairs<const N: usize>(&self, first: u32) -> [[f32; N]; 2] {
+        let raw: [[u32; 4]; N] =
+            match TABLE.get(first as usize..first as usize + N).and_then(|points| points.try_into().ok()) {
+                Some(points) => points,
+                None => std::array::from_fn(|k| sobol(first + k as u32)),
+            };
+        let mut pairs = [[0.0; N]; 2];
+        for (d, (numbers, seed)) in pairs.iter_mut().zip(self.seeds).enumerate() {
+            for (number, point) in numbers.iter_mut().zip(&raw) {
+                *number = unit(owen(point[d], seed));
             }
-            to
-        })
+        }
+        pairs
     }
 }
 
-/// The intervals of length `2^-bits` that point `index` of the sequence without scrambling lies in, in the first two
-/// dimensions.
-pub fn strata(index: u32, bits: u32) -> [u8; 2] {
-    let raw = sobol(index);
-    std::array::from_fn(|d| if bits == 0 { 0 } else { (raw[d] >> (32 - bits)) as u8 })
-}
-
 /// Nested uniform scrambling of the bits of `x`.
-#[inline]
+#[inline(always)]
 fn owen(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -133,9 +128,10 @@ pub fn hash(mut x: u32) -> u32 {
 }
 
 /// The upper 24 bits as a number in [0, 1).
-#[inline]
+#[inline(always)]
 pub fn unit(x: u32) -> f32 {
-    (x >> 8) as f32 * (1.0 / 16_777_216.0)
+    // Of numbers with a sign all processors have four at once.
+    (x >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }
 
 /// A stream of independent uniform numbers for the referee (PCG-RXS-M-XS 32; O'Neill 2014).
@@ -251,17 +247,13 @@ mod tests {
     }
 
     #[test]
-    fn scrambling_permutes_intervals() {
-        for seed in 0..50 {
+    fn pairs_are_those_of_single_points() {
+        for seed in 0..20 {
             let sequence = Sequence::new(seed, 7);
-            for bits in 0..6 {
-                let to = sequence.intervals(bits);
-                for index in 0..300 {
-                    let (point, from) = (sequence.point(index), strata(index, bits));
-                    for d in 0..2 {
-                        let interval = (point[d] * (1 << bits) as f32) as u8;
-                        assert_eq!(to[d][usize::from(from[d])], interval, "{seed} {bits} {index}");
-                    }
+            for first in [0, 3, 64, 1000, TABULATED as u32 - 8, TABULATED as u32 - 3, 70_000] {
+                let [u, v] = sequence.pairs::<8>(first);
+                for k in 0..8 {
+                    assert_eq!([u[k], v[k]], sequence.pair(first + k as u32), "{seed} {first}");
                 }
             }
         }

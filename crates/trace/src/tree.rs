@@ -11,6 +11,7 @@ use crate::collapse::collapse;
 use crate::intersect::{Prepared, tie_of};
 use crate::{Hit, Ray, portable};
 use glam::Vec3;
+use std::ops::Range;
 
 /// Boxes of a node.
 pub(crate) const WIDTH: usize = 8;
@@ -51,7 +52,7 @@ impl Child {
     }
 
     /// The leaf's blocks.
-    pub fn blocks(self) -> std::ops::Range<usize> {
+    pub fn blocks(self) -> Range<usize> {
         let first = (self.0 & (Child::MORE - 1)) as usize;
         first..first + if self.0 & Child::MORE != 0 { 2 } else { 1 }
     }
@@ -173,6 +174,31 @@ impl Tree {
     pub fn as_part(mut self, reach: f32) -> Tree {
         self.tie = tie_of([Vec3::splat(reach); 2]);
         self
+    }
+
+    /// Takes some triangles out, all of which lie in the box `around` from its lower to its upper corner: no ray meets them any more.
+    /// Boxes stay as they are, so that rays look in vain where they were.
+    pub fn take_out(&mut self, triangles: Range<u32>, around: [Vec3; 2]) {
+        let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(0));
+        while let Some(index) = open.pop() {
+            let Node { bounds, child } = &self.nodes[index];
+            let meets = |slot: usize| {
+                (0..3).all(|axis| bounds[axis][slot] <= around[1][axis] && bounds[3 + axis][slot] >= around[0][axis])
+            };
+            for slot in (0..WIDTH).filter(|slot| meets(*slot)) {
+                if !child[slot].is_leaf() {
+                    open.push(child[slot].index());
+                    continue;
+                }
+                for block in &mut self.blocks[child[slot].blocks()] {
+                    for lane in 0..LANES {
+                        if triangles.contains(&block.triangle[lane]) {
+                            block.set(lane, u32::MAX, &[Vec3::NAN; 3]);
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// The distance by which a hit competes with others: the smaller one counts, of equal ones that of the lower index.

@@ -397,3 +397,29 @@ fn batches_give_what_single_rays_give() {
     }
     assert!(hits.iter().flatten().count() > 300, "too few hits to mean anything");
 }
+
+/// What is taken out is met no more, whatever is beside it; all else is met as before.
+#[test]
+fn what_is_taken_out_is_not_met() {
+    let mut random = Random(17);
+    let triangles: Vec<[Vec3; 3]> = (0..600)
+        .map(|_| {
+            let middle = random.point();
+            [(); 3].map(|()| middle + 0.2 * random.point())
+        })
+        .collect();
+    let mut trees = both(&triangles);
+    let mut left = triangles.clone();
+    for out in [100..180, 0..1, 590..600, 120..130] {
+        let corners = triangles[out.clone()].iter().flatten();
+        let around = corners.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)]);
+        for tree in &mut trees {
+            tree.take_out(out.start as u32..out.end as u32, around);
+        }
+        left[out].fill([Vec3::NAN; 3]);
+        assert_eq!(trees[0].validate(&left), Ok(()));
+        for _ in 0..500 {
+            agree(&trees, &left, &ray(random.point(), random.direction()));
+        }
+    }
+}

@@ -2,7 +2,7 @@
 //!
 //! An entry of a row is an id and the distance of the hit. After an object has changed, three kinds of entries are dirty:
 //! those that met it, which their ids tell and which are traced anew; those that pass through the box where it is now, which
-//! are traced against it alone; and its own, all of them. The second are found by cones of directions ([`Strata`]), so that an
+//! are traced against it alone; and its own, all of them. The second are found by cones of directions ([`super::aim`]), so that an
 //! edit costs a few rays per element and not all. Shadow rays likewise: stopped ones that pass through the box where the object
 //! was may have come free, free ones that pass through the box where it is may be stopped.
 
@@ -11,9 +11,9 @@ mod shadows;
 
 pub use dirt::{Change, Dirt};
 
+use super::aim::{Aim, MOST_WORDS, towards};
 use super::body::Site;
 use super::column::Column;
-use super::strata::{Cells, Strata};
 use super::world::{Met, World};
 use glam::DVec3;
 use radiosity_scene::Bands;
@@ -39,6 +39,9 @@ pub const ROWS: u32 = 0x0100;
 /// Rays next to one that tell whether it starts inside a solid. More blur the outline of what is buried, fewer take
 /// chance for it.
 const NEIGHBOURS: usize = 4;
+
+/// Rays that are looked at together for these: mostly there is none among them.
+const AT_ONCE: usize = 16;
 
 /// Elements of which less than this part is exposed get no light.
 const LEAST_OPEN: f32 = 1.0 / 16.0;
@@ -100,6 +103,8 @@ pub struct Chunk {
     open: Vec<f32>,
     /// Entries of each row that met black backs.
     dark: Vec<u16>,
+    /// Whether only the first part of a row has said how much of the element is exposed.
+    is_rough: Vec<bool>,
     shadows: Vec<Shadows>,
     /// Changes that have been looked at, for the first part and the rest.
     seen: [usize; 2],
@@ -115,16 +120,11 @@ pub struct Work<'a> {
     pub changes: &'a [Change],
     /// What is dirty for chunks that have seen so many of them; others work it out.
     pub dirt: Vec<(usize, Dirt<'a>)>,
-    /// Cells for rows of as many rays as there are, and of the first part of them.
-    pub strata: &'a [Strata; 2],
     /// How many rays there shall be.
     pub target: Target,
     /// Whether black backs have an id.
     pub is_dark: &'a [bool],
 }
-
-/// Words of a bit for each ray of a row, at most.
-const MOST_WORDS: usize = 16;
 
 /// The numbers of the bits that are set.
 fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
@@ -161,6 +161,7 @@ impl Chunk {
             scale: [vec![0.0; n], vec![0.0; n]],
             open: vec![0.0; n],
             dark: vec![0; n],
+            is_rough: vec![false; n],
             shadows: Vec::new(),
             seen: [0; 2],
         };
@@ -228,6 +229,12 @@ impl Chunk {
         self.shadows.iter().any(|shadows| shadows.is_rough.contains(&true))
     }
 
+    /// Whether what is exposed of an element is as the first part of its row says.
+    #[cfg(test)]
+    pub fn has_rough_rows(&self) -> bool {
+        self.is_rough.contains(&true)
+    }
+
     /// Changes have other numbers now.
     pub fn renumber(&mut self, number: impl Fn(usize) -> usize) {
         self.seen = self.seen.map(number);
@@ -272,7 +279,11 @@ impl Chunk {
             };
             if !known.is_empty() {
                 for e in 0..self.len {
-                    rays += self.mend_row(work, part, dirt, e, known.clone());
+                    let (traced, has_changed) = self.mend_row(work, dirt, e, known.clone());
+                    rays += traced;
+                    if has_changed || self.is_rough[e] && part == Part::Far {
+                        self.weigh(work, part, e);
+                    }
                 }
             }
             for column in 0..self.shadows.len() {
@@ -294,7 +305,7 @@ impl Chunk {
                 self.trace_row(work, e, self.traced..target.rays);
             }
             self.traced = target.rays;
-            (0..self.len).for_each(|e| self.weigh(work, e));
+            (0..self.len).for_each(|e| self.weigh(work, Part::Far, e));
         }
         for column in 0..self.shadows.len() {
             if self.shadows[column].rays < target.shadows {
@@ -321,9 +332,10 @@ impl Chunk {
         }
     }
 
-    /// Works out what rays of a row count, after some were traced.
-    fn weigh(&mut self, work: &Work, e: usize) {
+    /// Works out what rays of a row count, after some of a part were traced.
+    fn weigh(&mut self, work: &Work, part: Part, e: usize) {
         let (rays, near) = (self.traced as usize, self.traced.min(NEAR_RAYS) as usize);
+        self.is_rough[e] = false;
         if self.dark[e] == 0 {
             self.scale[0][e] = 1.0 / near as f32;
             self.scale[1][e] = 1.0 / rays as f32;
@@ -338,6 +350,11 @@ impl Chunk {
             if open >= LEAST_OPEN { (1.0 / kept as f32, 1.0 / open) } else { (0.0, 0.0) }
         };
         let first = of(near);
+        if part == Part::Near && rays > near {
+            // All of them would take sixteen times as long, and are not all there.
+            (self.scale[0][e], self.open[e], self.is_rough[e]) = (first.0, first.1, true);
+            return;
+        }
         let all = if rays > near { of(rays) } else { first };
         (self.scale[0][e], self.scale[1][e], self.open[e]) = (first.0, all.0, all.1);
     }
@@ -350,12 +367,13 @@ impl Chunk {
         was != is
     }
 
-    /// Traces the entries of a row that changes have dirtied; `known` are those of the part that have been traced.
-    fn mend_row(&mut self, work: &Work, part: Part, dirt: &Dirt, e: usize, known: std::ops::Range<u32>) -> u64 {
+    /// Traces the entries of a row that changes have dirtied; `known` are those of the part that have been traced. Answers how many
+    /// rays that took, and whether other entries met black backs before.
+    fn mend_row(&mut self, work: &Work, dirt: &Dirt, e: usize, known: std::ops::Range<u32>) -> (u64, bool) {
         let lost = self.find_lost(dirt, e, &known);
         let cones = dirt.cones(&self.sites[e]);
         if lost == [0; MOST_WORDS] && cones.is_empty() {
-            return 0;
+            return (0, false);
         }
         let world = work.world;
         let (site, seed) = self.site(world, e);
@@ -369,31 +387,21 @@ impl Chunk {
                 has_changed |= self.set(work, e, self.at(e, m), entry(world, world.first(&ray, salt), direction));
             }
         }
-        if !cones.is_empty() {
-            let mut cells = Cells::default();
-            for cone in &cones {
-                match cone.angle {
-                    Some(angle) => {
-                        let direction = DVec3::from_array(frame.map(|axis| axis.dot(cone.axis)));
-                        work.strata[part as usize].towards(direction, angle, &mut cells);
-                    }
-                    None => cells = Cells::ALL,
-                }
-            }
-            let nearest = cones.iter().map(|cone| cone.nearest).fold(f64::INFINITY, f64::min);
-            let margin = 4.0 * world.offset;
-            work.strata[part as usize].rays(&cells, &sequence, |m| {
-                let Some(place) = m.checked_sub(known.start).filter(|_| m < known.end) else { return };
-                let is_traced = lost[place as usize / 64] >> (place % 64) & 1 == 1;
+        let margin = 4.0 * world.offset;
+        let nearest = cones.iter().map(|cone| cone.nearest).fold(f64::INFINITY, f64::min) - margin;
+        let aims: SmallVec<[Aim; 4]> = cones.iter().map(|cone| cone.aim(&frame)).collect();
+        let (in_part, at) = self.at(e, known.start);
+        let reached = &self.keys[in_part][at..at + known.len()];
+        let near = towards(&sequence, known.start, reached, (nearest as f32).next_down(), &aims);
+        for (word, (near, lost)) in near.into_iter().zip(lost).enumerate() {
+            for bit in ones(near & !lost) {
+                let m = known.start + 64 * word as u32 + bit;
                 let at = self.at(e, m);
                 let key = self.keys[at.0][at.1];
-                if is_traced || f64::from(key) + margin < nearest {
-                    return;
-                }
                 let [u, v] = sequence.pair(m);
                 let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
                 if !cones.iter().any(|cone| cone.has(direction)) {
-                    return;
+                    continue;
                 }
                 let (ray, salt) = shoot_to(world, &site, (&sequence, seed), direction, m);
                 let mut best: Option<(f32, u32)> = None;
@@ -418,12 +426,9 @@ impl Chunk {
                 if let Some(best) = best {
                     has_changed |= self.set(work, e, at, best);
                 }
-            });
+            }
         }
-        if has_changed {
-            self.weigh(work, e);
-        }
-        rays
+        (rays, has_changed)
     }
 
     /// Which entries of a row met objects that have changed, a bit for each of those that are `known`.
@@ -559,14 +564,20 @@ fn exposed(row: &[u32], sequence: &Sequence, is_dark: &[bool]) -> (u32, f32) {
         squares[m] = f32::INFINITY;
         // The nearest so far, the furthest of them last.
         let mut nearest = [(f32::INFINITY, false); NEIGHBOURS];
-        for (square, dark) in squares.iter().zip(&is_dark) {
-            if *square < nearest[NEIGHBOURS - 1].0 {
-                let mut k = NEIGHBOURS - 1;
-                while k > 0 && *square < nearest[k - 1].0 {
-                    nearest[k] = nearest[k - 1];
-                    k -= 1;
+        for (squares, dark) in squares.chunks(AT_ONCE).zip(is_dark.chunks(AT_ONCE)) {
+            let furthest = nearest[NEIGHBOURS - 1].0;
+            if !squares.iter().fold(false, |any, square| any | (*square < furthest)) {
+                continue;
+            }
+            for (square, dark) in squares.iter().zip(dark) {
+                if *square < nearest[NEIGHBOURS - 1].0 {
+                    let mut k = NEIGHBOURS - 1;
+                    while k > 0 && *square < nearest[k - 1].0 {
+                        nearest[k] = nearest[k - 1];
+                        k -= 1;
+                    }
+                    nearest[k] = (*square, *dark);
                 }
-                nearest[k] = (*square, *dark);
             }
         }
         let dark = nearest.iter().filter(|(_, dark)| *dark).count();

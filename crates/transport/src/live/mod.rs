@@ -29,12 +29,12 @@
 //! assert!(live.rays_traced() < 3 * first);
 //! ```
 
+mod aim;
 mod air;
 mod body;
 mod chunk;
 mod column;
 mod gather;
-mod strata;
 mod world;
 
 pub use air::Arrival;
@@ -52,7 +52,6 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use strata::Strata;
 
 /// How long the chunks that are handed out together shall take: as often it is asked whether to go on.
 const PIECE: Duration = Duration::from_millis(5);
@@ -77,7 +76,6 @@ pub struct Live {
     changes: Vec<Change>,
     /// So many changes may gather before those that nobody needs are looked for.
     room: usize,
-    strata: [Strata; 2],
     target: Target,
     most: Target,
     is_dark: Vec<bool>,
@@ -100,7 +98,6 @@ impl Live {
             starts: Vec::new(),
             changes: Vec::new(),
             room: LEAST_ROOM,
-            strata: [most.near(), most].map(|target| Strata::new(target.rays)),
             target: Target { rays: 0, shadows: 0 },
             most,
             rays_traced: 0,
@@ -298,7 +295,6 @@ impl Live {
             columns: &self.columns,
             changes: &self.changes,
             dirt: Vec::new(),
-            strata: &self.strata,
             target: self.target,
             is_dark: &self.is_dark,
         };
@@ -329,7 +325,7 @@ impl Live {
                 break true;
             }
             let started = Instant::now();
-            rays += own.par_iter_mut().map(|chunk| chunk.work(&work, part)).sum::<u64>();
+            rays += own.par_iter_mut().with_max_len(1).map(|chunk| chunk.work(&work, part)).sum::<u64>();
             let took = started.elapsed();
             if took < PIECE / 2 {
                 batch *= 2;
@@ -411,17 +407,23 @@ mod tests {
     #[test]
     fn a_thing_that_comes_back_leaves_no_rough_light() {
         let target = Target { rays: 128, shadows: 16 };
-        let [mut live, mut other] = [(); 2].map(|()| fresh(target));
-        live.work(Part::Far, || true);
-        for place in [DAffine3::from_translation(DVec3::new(1.0, 0.5, 0.7)), DAffine3::IDENTITY] {
-            live.place(1, place);
-            live.work(Part::Near, || true);
+        let [up, in_floor] = [[1.0, 0.5, 0.7], [0.3, 0.1, -2.0]].map(|by| DAffine3::from_translation(DVec3::from(by)));
+        for [by, to] in [[up, DAffine3::IDENTITY], [in_floor, DAffine3::IDENTITY], [up, in_floor]] {
+            let [mut live, mut other] = [(); 2].map(|()| fresh(target));
+            live.work(Part::Far, || true);
+            for place in [by, to] {
+                live.place(1, place);
+                live.work(Part::Near, || true);
+            }
+            let rough =
+                |live: &Live| [Chunk::has_rough_light, Chunk::has_rough_rows].map(|is| live.chunks.iter().any(is));
+            assert_eq!(rough(&live), [true, to == in_floor], "the first part alone has followed");
+            live.work(Part::Far, || true);
+            assert_eq!(rough(&live), [false; 2]);
+            other.place(1, to);
+            other.work(Part::Far, || true);
+            assert!(all(&live) == all(&other));
         }
-        assert!(live.chunks.iter().any(|chunk| chunk.has_rough_light()), "the first part alone has followed");
-        live.work(Part::Far, || true);
-        assert!(!live.chunks.iter().any(|chunk| chunk.has_rough_light()));
-        other.work(Part::Far, || true);
-        assert!(all(&live) == all(&other));
     }
 
     /// An object is dragged about while rows are still being traced: of its ways little is remembered, and in the end all

@@ -1,6 +1,6 @@
 //! All objects, and who is met first among them.
 //!
-//! One tree of boxes has all objects as they were when it was built; those that were moved since are passed there and
+//! One tree of boxes has all objects as they were when it was built; those that were moved since are taken out of it and
 //! have trees of their own, and many of them one more together. Which hit counts depends on the triangles alone: the smallest key, of equal ones the lowest
 //! number. So hits do not depend on how the objects are shared out among the trees.
 
@@ -42,8 +42,6 @@ pub struct World {
     common: Tree,
     /// Whether each object is not where the common tree has it.
     is_away: Vec<bool>,
-    /// Whether every ray stops where the common tree says.
-    is_plain: bool,
     /// Objects that are met in trees of their own, in their order.
     apart: Vec<u32>,
     /// One tree for all of these, if there is one.
@@ -90,7 +88,6 @@ impl World {
             body_of: Vec::new(),
             common: Tree::new(&[]),
             is_away: Vec::new(),
-            is_plain: false,
             apart: Vec::new(),
             joint: None,
             is_opaque: true,
@@ -138,19 +135,16 @@ impl World {
         added.place_at(matrix, self.middle);
         self.bodies.push(added);
         self.is_away.push(true);
-        self.is_plain = false;
         body
     }
 
     /// Puts an object elsewhere, or brings it back, with a tree of its own.
     pub fn place(&mut self, body: usize, matrix: DAffine3) {
+        self.take_out(body);
         let own = &mut self.bodies[body];
         own.place_at(matrix, self.middle);
         own.is_present = true;
         own.tree = Some(Tree::new(&single(&own.corners)).as_part((REACH * self.half) as f32));
-        self.is_away[body] = true;
-        self.is_plain = false;
-        self.joint = None;
         if let Err(at) = self.apart.binary_search(&(body as u32)) {
             self.apart.insert(at, body as u32);
         }
@@ -158,12 +152,20 @@ impl World {
 
     /// Takes an object away.
     pub fn remove(&mut self, body: usize) {
+        self.take_out(body);
         self.bodies[body].is_present = false;
         self.bodies[body].tree = None;
-        self.is_away[body] = true;
-        self.is_plain = false;
-        self.joint = None;
         self.apart.retain(|other| *other != body as u32);
+    }
+
+    /// Takes an object out of the trees of several.
+    fn take_out(&mut self, body: usize) {
+        self.joint = None;
+        if !std::mem::replace(&mut self.is_away[body], true) {
+            let own = &self.bodies[body];
+            let last = own.first_triangle + own.corners.len() as u32;
+            self.common.take_out(own.first_triangle..last, [own.bounds.low, own.bounds.high].map(|p| p.as_vec3()));
+        }
     }
 
     /// Whether so many objects have trees of their own that one for all is better.
@@ -209,7 +211,6 @@ impl World {
         self.joint = None;
         self.common = Tree::new(&corners).as_part((REACH * self.half) as f32);
         self.is_away.fill(false);
-        self.is_plain = self.is_opaque;
         self.apart.clear();
     }
 
@@ -233,25 +234,35 @@ impl World {
     /// What a ray meets first.
     #[inline]
     pub fn first(&self, ray: &Ray, salt: u32) -> Option<Met> {
-        let hit = if self.is_plain {
-            self.common.closest(ray)
-        } else {
-            self.common.closest_where(ray, |t, u, v, _| {
-                !self.is_away[self.body_of[t as usize] as usize] && self.stops(t, u, v, salt)
-            })
-        };
-        let mut first = hit.map(|hit| self.met(&self.common, &hit, 0));
-        let mut compete = |find: &dyn Fn(f32) -> Option<Met>| {
-            if let Some(met) = find(first.map_or(ray.t_max, |met| met.key))
+        let mut first: Option<Met> = None;
+        let mut compete = |met: Option<Met>| {
+            if let Some(met) = met
                 && first.is_none_or(|best| (met.key, met.triangle) < (best.key, best.triangle))
             {
                 first = Some(met);
             }
+            first.map_or(ray.t_max, |best| best.key)
         };
+        let mut key = ray.t_max;
         match &self.joint {
-            Some(joint) => compete(&|key| self.first_of_joint(joint, ray, salt, key)),
-            None => self.apart.iter().for_each(|body| compete(&|key| self.first_of(*body as usize, ray, salt, key))),
+            Some(joint) => key = compete(self.first_of_joint(joint, ray, salt, key)),
+            None => {
+                let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+                for body in self.apart.iter().map(|body| *body as usize) {
+                    if self.bodies[body].bounds.may_meet(origin, direction, f64::from(key), 4.0 * self.offset) {
+                        key = compete(self.first_of(body, ray, salt, key));
+                    }
+                }
+            }
         }
+        // The large tree last: by now rays are as short as they get.
+        let ray = Ray { t_max: ray.t_max.min(key.next_up()), ..*ray };
+        let hit = if self.is_opaque {
+            self.common.closest(&ray)
+        } else {
+            self.common.closest_where(&ray, |t, u, v, _| self.stops(t, u, v, salt))
+        };
+        compete(hit.map(|hit| self.met(&self.common, &hit, 0)));
         first
     }
 
@@ -297,12 +308,10 @@ impl World {
     /// Whether anything stops a ray before its end.
     #[inline]
     pub fn blocked(&self, ray: &Ray, salt: u32) -> bool {
-        let common = if self.is_plain {
+        let common = if self.is_opaque {
             self.common.blocked(ray)
         } else {
-            self.common.blocked_where(ray, |t, u, v, _| {
-                !self.is_away[self.body_of[t as usize] as usize] && self.stops(t, u, v, salt)
-            })
+            self.common.blocked_where(ray, |t, u, v, _| self.stops(t, u, v, salt))
         };
         common
             || match &self.joint {
@@ -317,9 +326,8 @@ impl World {
     /// Calls back with the object of each surface that stops a ray before its end, in any order, more than once for some.
     pub fn all_in_the_way(&self, ray: &Ray, salt: u32, mut visit: impl FnMut(usize)) {
         self.common.blocked_where(ray, |t, u, v, _| {
-            let body = self.body_of[t as usize] as usize;
-            if !self.is_away[body] && self.stops(t, u, v, salt) {
-                visit(body);
+            if self.stops(t, u, v, salt) {
+                visit(self.body_of(t));
             }
             false
         });
@@ -328,10 +336,7 @@ impl World {
 
     /// Whether one of some objects stops a ray before its end.
     pub fn blocked_by_any(&self, ray: &Ray, salt: u32, is_one: impl Fn(usize) -> bool) -> bool {
-        let common = self.common.blocked_where(ray, |t, u, v, _| {
-            let body = self.body_of[t as usize] as usize;
-            !self.is_away[body] && is_one(body) && self.stops(t, u, v, salt)
-        });
+        let common = self.common.blocked_where(ray, |t, u, v, _| is_one(self.body_of(t)) && self.stops(t, u, v, salt));
         common || self.apart.iter().any(|body| is_one(*body as usize) && self.blocked_by(*body as usize, ray, salt))
     }
 

@@ -63,20 +63,20 @@ impl Solver {
         self.board.post(Subject::Mesh(object.id.0), Notice::Binary(mesh));
     }
 
-    /// Which elements of an object are cut, and the light of a layer: of its vertices, and of the places of these elements.
-    pub(super) fn light_of(&self, id: ObjectId, layer: Layer) -> (Vec<(u32, u32)>, [Vec<Bands>; 2]) {
+    /// Which elements of an object are cut, and the light of a layer as it is sent: of its vertices, and of the places of these elements.
+    pub(super) fn light_of(&self, id: ObjectId, layer: Layer) -> (Vec<(u32, u32)>, [Vec<u16>; 2]) {
         let light = self.session.light(id, layer);
         let of_cuts = if light.is_empty() { Vec::new() } else { self.session.light_of_cuts(id, layer, &light) };
-        (self.session.cuts(id), [light, of_cuts])
+        (self.session.cuts(id), [light, of_cuts].map(|light| wire::halves(&light)))
     }
 
-    /// Says how an object is cut, if that has changed, and gives its light as it is sent: of its vertices, and after those of the places
+    /// Says how an object is cut, if that has changed, and gives its light as one: of its vertices, and after those of the places
     /// of its cuts, which begin with their number. Layers are sent at different times, and a page has to know which places these are.
     pub(super) fn post_cuts(
         &mut self,
         id: ObjectId,
         cuts: Vec<(u32, u32)>,
-        [light, of_cuts]: [Vec<Bands>; 2],
+        [mut light, of_cuts]: [Vec<u16>; 2],
     ) -> Vec<u16> {
         let known = self.cut.get(&id);
         let is_other = known.map_or(!cuts.is_empty(), |(_, known)| *known != cuts);
@@ -85,13 +85,12 @@ impl Solver {
             self.board.post(Subject::Cuts(id.0), Notice::Binary(wire::cuts(id, number, &cuts)));
             self.cut.insert(id, (number, cuts));
         }
-        let mut halves = wire::halves(&light);
         if !of_cuts.is_empty() {
             let number = self.cut.get(&id).map_or(0, |(number, _)| *number);
-            halves.extend([number as u16, (number >> 16) as u16, 0]);
-            halves.extend(wire::halves(&of_cuts));
+            light.extend([number as u16, (number >> 16) as u16, 0]);
+            light.extend(of_cuts);
         }
-        halves
+        light
     }
 
     pub(super) fn post_object(&self, object: &ModelObject) {

@@ -1,5 +1,6 @@
 //! What an edit has dirtied, as chunks look for it.
 
+use super::super::aim::Aim;
 use super::super::body::{Body, Bounds, Site};
 use super::super::world::World;
 use glam::DVec3;
@@ -71,12 +72,12 @@ impl<'a> Dirt<'a> {
             let distance = along.length();
             if distance <= 1.001 * reach {
                 cones.clear();
-                cones.push(Cone { axis: site.normal, angle: None, nearest: 0.0 });
+                cones.push(Cone { axis: site.normal, cosine: None, nearest: 0.0 });
                 break;
             }
             let sine = reach / distance;
-            let angle = Some(((1.0 - sine * sine).sqrt(), sine));
-            cones.push(Cone { axis: along / distance, angle, nearest: distance - reach });
+            let cosine = Some((1.0 - sine * sine).sqrt());
+            cones.push(Cone { axis: along / distance, cosine, nearest: distance - reach });
         }
         cones
     }
@@ -84,9 +85,9 @@ impl<'a> Dirt<'a> {
 
 /// Directions to a ball.
 pub struct Cone {
-    pub axis: DVec3,
-    /// Cosine and sine of half its angle; none for all directions.
-    pub angle: Option<(f64, f64)>,
+    axis: DVec3,
+    /// Cosine of half its angle; none for all directions.
+    cosine: Option<f64>,
     /// Nearer than this nothing of the ball is met.
     pub nearest: f64,
 }
@@ -94,6 +95,11 @@ pub struct Cone {
 impl Cone {
     #[inline]
     pub fn has(&self, direction: DVec3) -> bool {
-        self.angle.is_none_or(|(cosine, _)| self.axis.dot(direction) >= cosine - ROUNDING)
+        self.cosine.is_none_or(|cosine| self.axis.dot(direction) >= cosine - ROUNDING)
+    }
+
+    /// The same in an element's frame.
+    pub fn aim(&self, frame: &[DVec3; 3]) -> Aim {
+        self.cosine.map_or(Aim::ALL, |cosine| Aim::new(frame.map(|axis| axis.dot(self.axis)), cosine))
     }
 }
