@@ -2,7 +2,8 @@
 //!
 //! A notice has a key, and only the latest of a key is kept, under a revision that grows with each post. A page that
 //! remembers the last revision it was sent is owed exactly what is newer: a new page everything, one that was slow what it
-//! missed without what was outdated meanwhile. So nobody waits for a page and no page fills the memory.
+//! missed without what was outdated meanwhile. So nobody waits for a page and no page fills the memory. How far the solution is comes
+//! after the light that it tells of.
 
 use axum::body::Bytes;
 use radiosity::session::Layer;
@@ -90,8 +91,13 @@ impl<K: Copy + Eq + std::hash::Hash, V: PartialEq> Latest<K, V> {
         true
     }
 
-    fn after(&self, seen: u64) -> impl Iterator<Item = (u64, &V)> {
-        self.order.range(seen + 1..).map(|(revision, key)| (*revision, &self.posts[key].1))
+    /// The latest of a key, and its revision.
+    fn of(&self, key: &K) -> Option<(u64, &V)> {
+        self.posts.get(key).map(|(revision, value)| (*revision, value))
+    }
+
+    fn after(&self, seen: u64) -> impl Iterator<Item = (u64, K, &V)> {
+        self.order.range(seen + 1..).map(|(revision, key)| (*revision, *key, &self.posts[key].1))
     }
 }
 
@@ -128,7 +134,10 @@ impl Posts {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seen {
     notices: u64,
+    status: u64,
     light: u64,
+    /// Light up to there goes before what is said of it.
+    before_status: Option<u64>,
 }
 
 impl Seen {
@@ -232,12 +241,24 @@ impl Board {
         self.lock().awake().iter().any(|(_, watched)| !watched.is_known)
     }
 
-    /// The next notice that a page has not seen.
-    pub fn next_notice(&self, seen: &mut Seen) -> Option<Notice> {
+    /// The next notice that a page has not seen. How far the solution is comes last, and waits for light of the layer that the page looks
+    /// at: for what was there when it first had to, so that a slow page is told, too.
+    pub fn next_notice(&self, layer: Option<Layer>, seen: &mut Seen) -> Option<Notice> {
         let posts = self.lock();
-        let (revision, notice) = posts.notices.after(seen.notices).next()?;
-        seen.notices = revision;
-        Some(notice.clone())
+        let mut others = posts.notices.after(seen.notices).filter(|(_, subject, _)| *subject != Subject::Status);
+        if let Some((revision, _, notice)) = others.next() {
+            seen.notices = revision;
+            return Some(notice.clone());
+        }
+        let (revision, status) = posts.notices.of(&Subject::Status).filter(|(revision, _)| *revision > seen.status)?;
+        let bound = *seen.before_status.get_or_insert(revision);
+        let watched = posts.layers.iter().find(|(of, _)| Some(*of) == layer);
+        let owed = watched.and_then(|(_, watched)| watched.light.after(seen.light).next());
+        if owed.is_some_and(|(revision, ..)| revision < bound) {
+            return None;
+        }
+        (seen.status, seen.before_status) = (revision, None);
+        Some(status.clone())
     }
 
     /// The next light of a layer that a page has not seen, about a frame of it.
@@ -245,7 +266,7 @@ impl Board {
         let posts = self.lock();
         let Some((_, watched)) = posts.layers.iter().find(|(of, _)| *of == layer) else { return Vec::new() };
         let (mut chunks, mut bytes) = (Vec::new(), 0);
-        for (revision, chunk) in watched.light.after(seen.light) {
+        for (revision, _, chunk) in watched.light.after(seen.light) {
             seen.light = revision;
             bytes += 2 * chunk.values.len();
             chunks.push(chunk.clone());
@@ -262,7 +283,7 @@ mod tests {
     use super::*;
 
     fn text(board: &Board, seen: &mut Seen) -> Option<String> {
-        board.next_notice(seen).map(|notice| match notice {
+        board.next_notice(None, seen).map(|notice| match notice {
             Notice::Text(text) => text,
             Notice::Binary(_) => panic!("text was posted"),
         })
@@ -283,6 +304,38 @@ mod tests {
         assert_eq!(text(&board, &mut slow).as_deref(), Some("scene"));
         assert_eq!(text(&board, &mut slow).as_deref(), Some("999"));
         assert_eq!(text(&board, &mut slow), None);
+    }
+
+    /// What is said of light comes after it, even to a page that is never sent all of it.
+    #[test]
+    fn how_far_the_solution_is_comes_after_its_light() {
+        let board = Board::new();
+        let mut seen = Seen::default();
+        let layer = Layer::Total;
+        board.watch(layer);
+        board.layers();
+        let say = |text: &str| board.post(Subject::Status, Notice::Text(text.into()));
+        // Each a frame of its own.
+        let post = |object: u32, value: u16| board.post_light(layer, object, &vec![value; FRAME / 2]);
+        let next = |seen: &mut Seen| match board.next_notice(Some(layer), seen) {
+            Some(Notice::Text(text)) => Some(text),
+            _ => None,
+        };
+        let sent = |seen: &mut Seen| board.next_light(layer, seen).first().map(|chunk| chunk.object);
+        post(0, 1);
+        post(1, 1);
+        say("lit");
+        board.post(Subject::History, Notice::Text("history".into()));
+        assert_eq!(next(&mut seen).as_deref(), Some("history"));
+        assert_eq!((next(&mut seen), sent(&mut seen)), (None, Some(0)));
+        assert_eq!(next(&mut seen), None);
+        // Light that is newer does not hold it up once more.
+        post(0, 2);
+        say("brighter");
+        assert_eq!(sent(&mut seen), Some(1));
+        assert_eq!(next(&mut seen).as_deref(), Some("brighter"));
+        assert_eq!(sent(&mut seen), Some(0));
+        assert_eq!((next(&mut seen), sent(&mut seen)), (None, None));
     }
 
     #[test]

@@ -245,7 +245,8 @@ async fn serve(place: Place, mut socket: WebSocket) {
     ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         news.mark_unchanged();
-        let mut next = server.board.next_notice(&mut seen).map(|notice| match notice {
+        let layer = watch.as_ref().map(|watch| watch.layer);
+        let mut next = server.board.next_notice(layer, &mut seen).map(|notice| match notice {
             Notice::Text(text) => Message::Text(text.into()),
             Notice::Binary(bytes) => Message::Binary(bytes),
         });

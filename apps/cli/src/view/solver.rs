@@ -620,7 +620,7 @@ mod tests {
                 solver.turn();
             }
             let mut seen = Seen::default();
-            let notices: Vec<_> = std::iter::from_fn(|| board.next_notice(&mut seen)).collect();
+            let notices: Vec<_> = std::iter::from_fn(|| board.next_notice(None, &mut seen)).collect();
             let cuts: Vec<Vec<u32>> = notices
                 .iter()
                 .filter_map(|notice| match notice {
