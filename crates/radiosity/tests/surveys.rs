@@ -142,6 +142,53 @@ fn elements_are_cut_where_shadows_are_soft() {
     assert!(joined > 20, "{joined}");
 }
 
+/// Lamps of sixty rooms are one object, and a room sees two spots of it or none: elements keep the light that their own rays found.
+#[test]
+fn lamps_of_many_rooms_keep_their_light() {
+    const ROOMS: usize = 60;
+    const WIDTH: f64 = 6.0;
+    let mut scene = Scene::default();
+    scene.materials.push(Material { base_color: [0.0, 0.0, 0.0, 1.0], double_sided: true, ..Material::default() });
+    scene.materials.push(Material { emissive: [1000.0; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() });
+    let upright = [[-1., 0.], [-1., 4.], [1., 4.], [1., 0.]];
+    let (mut walls, mut lamps) = (Vec::new(), Vec::new());
+    for room in 0..ROOMS {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(WIDTH * room as f64 + x, y, z);
+        let level =
+            |half: f64, y: f64| [[-1., 1.], [1., 1.], [1., -1.], [-1., -1.]].map(|[x, z]| at(half * x, y, half * z));
+        scene.add_quad("floor", 0, level(2.0, 0.0));
+        scene.add_quad("sheet", 0, level(0.5, 1.0));
+        let [a, b, c, d] = upright.map(|[z, y]| at(0.5 * WIDTH, y, 4.0 * z));
+        walls.extend([[a, b, c], [a, c, d]]);
+        let [d, c, b, a] = level(0.2, 2.0);
+        lamps.extend([[a, b, c], [a, c, d]]);
+    }
+    scene.add_triangles("walls", 0, &walls);
+    scene.add_triangles("lamps", 1, &lamps);
+    let options = SessionOptions { element_size: Some(0.8), rays: 4, places: 1_000_000, ..SessionOptions::default() };
+    let mut session = Session::new(scene, &options).unwrap();
+    finish(&mut session);
+    let model = session.model();
+    let mut lit = 0;
+    for floor in model.objects.iter().filter(|object| object.name == "floor") {
+        let light = session.light(floor.id, Layer::Total);
+        let places = session.light_of_cuts(floor.id, Layer::Total, &light);
+        let own = session.irradiance(floor.id);
+        let mut first = 0;
+        for (element, parts) in session.cuts(floor.id) {
+            let places = &places[first..first + ((parts + 1) * (parts + 2) / 2) as usize];
+            first += places.len();
+            // Of those whose own rays found nothing, spots tell more.
+            if own[element as usize][1] > 0.0 {
+                let corners = &floor.indices[3 * element as usize..][..3];
+                assert!(places.iter().eq(corners.iter().map(|vertex| &light[*vertex as usize])), "{element}: {parts}");
+                lit += 1;
+            }
+        }
+    }
+    assert!(lit > 2000, "{lit}");
+}
+
 /// Edges of shadows are shown as wide as a part of an element; after an edit the picture is that of a session which began so.
 #[test]
 fn elements_are_cut_where_light_has_an_edge() {
