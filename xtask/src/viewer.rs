@@ -64,15 +64,21 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
 /// What the page is made of, as the lock file says.
 fn install(viewer: &Path) -> Result<(), Fault> {
     let version = Command::new("node").arg("--version").output().ok();
-    let version = version.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned()).unwrap_or_default();
-    let major = version.trim_start_matches('v').split('.').next().and_then(|major| major.parse::<u32>().ok());
-    if major.is_none_or(|major| major < NODE) {
-        let there = if version.is_empty() { "there is none".to_owned() } else { format!("there is {version}") };
-        return Err(Fault::Viewer(format!(
-            "Node.js {NODE} or newer is needed, {there}; install it with npm (https://nodejs.org). The program itself is built without"
-        )));
-    }
+    check(version.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).as_deref())?;
     run(Command::new("npm").current_dir(viewer).args(["ci", "--no-audit", "--no-fund", "--loglevel=error"]))
+}
+
+/// Whether this Node.js, if there is any, is new enough.
+fn check(version: Option<&str>) -> Result<(), Fault> {
+    let major =
+        version.and_then(|version| version.trim().trim_start_matches('v').split('.').next()?.parse::<u32>().ok());
+    if major.is_some_and(|major| major >= NODE) {
+        return Ok(());
+    }
+    let there = version.map_or_else(|| "there is none".to_owned(), |version| format!("there is {}", version.trim()));
+    Err(Fault::Viewer(format!(
+        "Node.js {NODE} or newer is needed, {there}; install it with npm (https://nodejs.org). The program itself is built without"
+    )))
 }
 
 fn build(viewer: &Path, folder: &str) -> Result<(), Fault> {
@@ -110,5 +116,25 @@ fn run(command: &mut Command) -> Result<(), Fault> {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(Fault::Viewer(format!("`{line}`: {status}"))),
         Err(error) => Err(Fault::Viewer(format!("`{line}` did not start: {error}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn node_that_is_missing_or_old_is_named() {
+        let refused = |version| check(version).unwrap_err().to_string();
+        for (version, there) in
+            [(None, "there is none"), (Some("v18.19.0\n"), "there is v18.19.0;"), (Some(""), "there is")]
+        {
+            let text = refused(version);
+            assert!(text.contains(&format!("Node.js {NODE} or newer is needed")) && text.contains(there), "{text}");
+            assert!(text.contains("https://nodejs.org"), "{text}");
+        }
+        for version in ["v20.0.0\n", "v22.11.1", "24.1.0"] {
+            assert!(check(Some(version)).is_ok(), "{version}");
+        }
     }
 }

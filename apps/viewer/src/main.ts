@@ -3,7 +3,7 @@ import './style.css';
 import { App } from './app';
 import { helpDialog, listen } from './keys';
 import { gridNumbers, legend, lineNumbers } from './legend';
-import { bar, duration } from './panels/bar';
+import { bar, remaining } from './panels/bar';
 import { camerasPanel } from './panels/cameras';
 import { lightsPanel } from './panels/lights';
 import { gridPanel, meterPanel } from './panels/meter';
@@ -53,8 +53,8 @@ function start(): void {
       doing.textContent = told.textContent = 'The connection was lost; what is seen is from before. Trying again … If the program has ended, start it again and open the address that it prints.';
       return;
     }
-    const left = status.is_done || status.left === null ? '' : ` · about ${duration(status.left)} left`;
-    doing.textContent = status.doing + left;
+    const left = status.is_done ? '' : remaining(status);
+    doing.textContent = left ? `${status.doing} · about ${left}` : status.doing;
     const milestone = status.is_done ? 'The light is up to date.' : 'The light is being computed.';
     if (told.textContent !== milestone) told.textContent = milestone;
   };

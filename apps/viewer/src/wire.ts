@@ -92,6 +92,8 @@ export interface StatusNotice {
   is_following: boolean;
   rays: number;
   most_rays: number;
+  /** Share of all rays that are there. */
+  share: number;
   /** Relative error of irradiance, estimated over all surfaces; none before there is one. */
   error: number | null;
   seconds: number;

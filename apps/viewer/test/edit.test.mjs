@@ -4,31 +4,21 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { compared, difference, done, folder, luxOf, NEAR, offline, online, picture, pixelsOf, restored, saved, SMALL, state, view } from './program.mjs';
+import { compared, difference, decoded, done, folder, handleOf, luxOf, NEAR, offline, online, picture, pixels, pixelsOf, rendered, restored, saved, SMALL, state, view } from './program.mjs';
 import { shown } from './display.mjs';
 import { studio } from './studio.mjs';
 
 const { program, pages } = await started();
 
-const named = async (page, name) => (await state(page)).objects.find((object) => object.name === name && !object.deleted);
+const mean = (list) => list.reduce((sum, x) => sum + x, 0) / list.length;
 
-/** Where the handle is that moves what is selected along the world's x, in pixels of the page. */
-const handle = (page) => page.evaluate(() => {
-  const { app } = window.radiosity;
-  const { camera, canvas } = app.stage;
-  const spot = app.spot();
-  // As TransformControls scales its handles; 0.45 of that is on the shaft.
-  const size = spot.distanceTo(camera.position) * Math.min(1.9 * Math.tan((Math.PI * camera.fov) / 360), 7) * (0.8 / 4);
-  const at = app.stage.project(spot.clone().setX(spot.x + 0.45 * size));
-  const box = canvas.getBoundingClientRect();
-  return [box.left + at.x, box.top + at.y];
-});
+const named = async (page, name) => (await state(page)).objects.find((object) => object.name === name && !object.deleted);
 
 /** Takes hold of that handle; where it is. However slow the page draws: until the handle knows of the pointer. */
 const grab = async (page) => {
   const deadline = Date.now() + 20_000;
   for (;;) {
-    const [x, y] = await handle(page);
+    const [x, y] = await handleOf(page);
     await page.mouse.move(x + 1, y);
     await page.mouse.move(x, y);
     await page.waitForTimeout(100);
@@ -85,14 +75,14 @@ test('a thing is dragged, and light follows while it is and as a batch solve has
   await picture(page, 'dragged');
 
   // A gesture is one change, and the handles go back with the thing.
-  const there = await handle(page);
+  const there = await handleOf(page);
   await page.keyboard.press('Control+z');
   await page.waitForFunction((id) => window.radiosity.state().objects.find((object) => object.id === id).matrix[12] === 0, block.id);
   await page.waitForTimeout(200);
   const back = await page.evaluate(() => window.radiosity.app.gizmo.where().map((x) => x));
   const spot = await page.evaluate(() => window.radiosity.app.spot().toArray());
   back.forEach((value, k) => assert.ok(Math.abs(value - spot[k]) < 1e-6, `${back} ${spot}`));
-  assert.notDeepEqual(await handle(page), there);
+  assert.notDeepEqual(await handleOf(page), there);
   await restored(page);
   assert.deepEqual(page.faults, []);
   await page.context().close();
@@ -187,7 +177,6 @@ test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a
     app.select(null);
     app.paint(wall, [0.1, 0.2, 0.6]);
     app.setLight(app.lights.get(light), { dimming: 0.5 });
-    app.exposure.set(0);
   }, [block.id, wall.id, lights[0].id]);
   await done(page, edits + 3);
   const off = await compared(page);
@@ -196,14 +185,25 @@ test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a
   console.log(`${(100 * off).toFixed(1)} % from a batch solve of the edited scene; the last change took ${latency.toFixed(0)} ms`);
 
   // The picture is the light that was read.
+  await page.evaluate(() => window.radiosity.app.exposure.free());
+  await pixels(page);
+  const { exposure } = await state(page);
+  await page.evaluate((exposure) => window.radiosity.app.exposure.set(exposure), exposure);
   const places = Array.from({ length: 600 }, (_, i) => [((i % 30) + 0.5) / 30, (Math.floor(i / 30) + 0.5) / 20]);
-  const seen = await pixelsOf(page, places);
+  const seen = (await pixelsOf(page, places)).map((known, i) => known && { ...known, place: places[i] });
   const known = seen.filter(Boolean);
   assert.ok(known.length > 200, `${known.length} places of the picture`);
   for (const place of known) {
-    const right = shown(place, 0);
+    const right = shown(place, exposure);
     place.pixel.forEach((byte, band) => assert.ok(Math.abs(byte - right[band]) <= 2, `${place.name}: ${place.pixel}, and by its light ${right}`));
   }
+
+  // And the picture that a batch solve of the edited scene has.
+  const { at } = await decoded(page, await rendered(page, exposure));
+  const off_truth = known.flatMap((place) => at(place.place).map((byte, band) => Math.abs(byte - place.pixel[band]))).sort((a, b) => a - b);
+  const [middle, most_off] = [mean(off_truth), off_truth[Math.floor(0.95 * off_truth.length)]];
+  console.log(`pixels of a batch solve of the edited scene: ${middle.toFixed(2)} of 255 apart in the mean, ${most_off} at most in 95 %`);
+  assert.ok(middle < 3 && most_off <= 9, `${middle} ${most_off}`);
 
   // And the picture of who opens the edited scene afresh. It may be rounded as files are.
   await folder(async (path) => {
@@ -212,22 +212,36 @@ test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a
     const fresh = await pages.open(again.url);
     await done(fresh);
     const camera = await page.evaluate(() => window.radiosity.app.stage.place(''));
-    await fresh.evaluate((camera) => {
+    await fresh.evaluate(([camera, exposure]) => {
       const { app } = window.radiosity;
       app.look(camera);
-      app.exposure.set(0);
-    }, camera);
+      app.exposure.set(exposure);
+    }, [camera, exposure]);
     const other = await pixelsOf(fresh, places);
     const pairs = seen.flatMap((place, i) => (place && other[i] ? [[place.pixel, other[i].pixel]] : []));
     assert.ok(pairs.length > 0.95 * known.length, `${pairs.length} of ${known.length}`);
     const apart = pairs.flatMap(([a, b]) => a.map((byte, band) => Math.abs(byte - b[band]))).sort((a, b) => a - b);
-    const [mean, most] = [apart.reduce((a, b) => a + b, 0) / apart.length, apart[Math.floor(0.99 * apart.length)]];
-    console.log(`pixels of the edited scene opened afresh: ${mean.toFixed(2)} of 255 apart in the mean, ${most} at most in 99 %`);
-    assert.ok(mean < 0.5 && most <= 3, `${mean} ${most}`);
+    const [middle, most] = [mean(apart), apart[Math.floor(0.99 * apart.length)]];
+    console.log(`pixels of the edited scene opened afresh: ${middle.toFixed(2)} of 255 apart in the mean, ${most} at most in 99 %`);
+    assert.ok(middle < 0.5 && most <= 3, `${middle} ${most}`);
     await fresh.context().close();
     await again.end();
   });
   await picture(page, 'edited');
+
+  // The meter reads what was painted.
+  await page.evaluate((wall) => {
+    const { app } = window.radiosity;
+    const place = app.stage.project(app.stage.surfaces.get(wall).geometry.boundingBox.getCenter(app.stage.camera.position.clone()));
+    const { clientWidth, clientHeight } = app.stage.canvas;
+    app.measuring.pick((2 * place.x) / clientWidth - 1, 1 - (2 * place.y) / clientHeight);
+  }, wall.id);
+  await page.waitForFunction(() => window.radiosity.state().probe !== null);
+  const { probe, selected } = await state(page);
+  assert.equal(selected, wall.id);
+  probe.reflectance.forEach((read, band) => assert.ok(Math.abs(read - [0.1, 0.2, 0.6][band]) < 1e-5, `${probe.reflectance}`));
+  probe.radiosity.forEach((read, band) => assert.ok(Math.abs(read - probe.reflectance[band] * probe.irradiance[band]) < 1e-4 * read));
+  assert.match(await page.locator('#meter').innerText(), /Reflectance\s+20\.8 %/);
 
   const before = await luxOf(page, 50);
   await page.evaluate(() => window.radiosity.app.undo());

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { done, picture, restored, state } from './program.mjs';
+import { done, picture, pixels, restored, state } from './program.mjs';
 
 const { program, pages } = await started();
 
@@ -41,20 +41,19 @@ test('everything is reached by keyboard alone', async () => {
     ['F2', [false, true, true, true, count, true]], ['i', [false, false, true, true, count, true]],
     ['e', [false, false, false, true, 0, true]], ['t', [false, false, false, false, 0, false]],
   ];
-  const pixels = () => page.locator('canvas').first().screenshot();
-  await page.waitForTimeout(1500);
-  const first = await pixels();
+  const first = await pixels(page);
+  let before = first;
   for (const [key, is] of steps) {
-    const before = await pixels();
     await page.keyboard.press(key);
     // Rays are asked for.
     await page.waitForFunction((is) => is === (window.radiosity.app.marks.lines !== null), is.at(-1));
     assert.deepEqual(await shown(), is, key);
-    await page.waitForTimeout(400);
+    const after = await pixels(page);
     if (is.every(Boolean)) await picture(page, 'false-colours');
-    assert.ok(!before.equals(await pixels()), `${key} changes the picture`);
+    assert.ok(!before.equals(after), `${key} changes the picture`);
+    before = after;
   }
-  assert.ok(first.equals(await pixels()), 'as before');
+  assert.ok(first.equals(before), 'as before');
   await page.keyboard.press('b');
   await page.waitForFunction(() => window.radiosity.state().bookmarks.length === 1);
   await page.keyboard.press('h');

@@ -154,6 +154,16 @@ async function quiet(page) {
   }
 }
 
+/** The picture, once nothing has been drawn for a while: exposure has arrived, and a slow machine shows all pixels again. */
+export async function pixels(page) {
+  const drawn = () => page.evaluate(() => window.radiosity.app.stage.frames);
+  for (let last = -1, now = await drawn(); now !== last; now = await drawn()) {
+    last = now;
+    await page.waitForTimeout(700);
+  }
+  return page.locator('canvas').first().screenshot();
+}
+
 /** The scene that a page would save. */
 export async function saved(page) {
   const glb = await page.evaluate(async () => [...new Uint8Array(await (await fetch('scene.glb')).arrayBuffer())]);
@@ -170,19 +180,36 @@ export async function folder(use) {
   }
 }
 
-/** Illuminance at points [x, y, z, nx, ny, nz] of the scene that a page would save, by `radiosity measure`, lx. */
-export async function measured(page, points) {
+/** Runs the program on the scene that a page would save, as `scene.glb` in a folder that goes; gives what is made of the folder. */
+export async function batch(page, verb, options, use, files = {}) {
   const glb = await saved(page);
   return folder((path) => {
-    writeFileSync(join(path, 'scene.glb'), glb);
-    writeFileSync(join(path, 'points.csv'), ['x,y,z,nx,ny,nz', ...points.map((point) => point.join(','))].join('\n'));
-    const run = spawnSync(radiosity, ['measure', 'scene.glb', '--points', 'points.csv', '--error', '3%', '-o', 'light.csv', '--quiet'],
-      { cwd: path, encoding: 'utf8' });
-    if (run.status !== 0) throw new Error(`radiosity measure: ${run.stderr}`);
-    const [names, ...rows] = readFileSync(join(path, 'light.csv'), 'utf8').trim().split('\n');
+    for (const [name, content] of Object.entries({ 'scene.glb': glb, ...files })) writeFileSync(join(path, name), content);
+    const run = spawnSync(radiosity, [verb, 'scene.glb', '--error', '3%', '--quiet', ...options], { cwd: path, encoding: 'utf8' });
+    if (run.status !== 0) throw new Error(`radiosity ${verb}: ${run.stderr}`);
+    return use((name) => readFileSync(join(path, name)));
+  });
+}
+
+/** Illuminance at points [x, y, z, nx, ny, nz] of the scene that a page would save, by `radiosity measure`, lx. */
+export function measured(page, points) {
+  const table = ['x,y,z,nx,ny,nz', ...points.map((point) => point.join(','))].join('\n');
+  return batch(page, 'measure', ['--points', 'points.csv', '-o', 'light.csv'], (file) => {
+    const [names, ...rows] = file('light.csv').toString().trim().split('\n');
     const column = names.split(',').indexOf('illuminance_lux');
     return rows.map((row) => Number(row.split(',')[column]));
+  }, { 'points.csv': table });
+}
+
+/** What the page shows, by `radiosity render`: a PNG of the scene that it would save, from where it looks. */
+export async function rendered(page, exposure) {
+  const [eye, target, fov, size] = await page.evaluate(() => {
+    const { stage } = window.radiosity.app;
+    const { matrix: m, fov } = stage.place('');
+    return [m.slice(12, 15), [0, 1, 2].map((k) => m[12 + k] - m[8 + k]), (180 / Math.PI) * fov, [stage.canvas.clientWidth, stage.canvas.clientHeight]];
   });
+  const options = ['--eye', eye, '--target', target, '--fov', fov, '--size', size.join('x'), '--exposure', exposure, '-o', 'picture.png'].map(String);
+  return batch(page, 'render', options, (file) => file('picture.png'));
 }
 
 /** The relative L2 difference of two lists. */
@@ -233,3 +260,31 @@ export const luxOf = (page, asked) => page.evaluate((asked) => {
 
 /** The picture at places of the canvas, and what is known of the light there. */
 export const pixelsOf = (page, places) => page.evaluate((places) => window.radiosity.seen(places), places);
+
+/** Where the handle is that moves what is selected along the world's x, in pixels of the page. */
+export const handleOf = (page) => page.evaluate(() => {
+  const { app } = window.radiosity;
+  const { camera, canvas } = app.stage;
+  const spot = app.spot();
+  // As TransformControls scales its handles; 0.45 of that is on the shaft.
+  const size = spot.distanceTo(camera.position) * Math.min(1.9 * Math.tan((Math.PI * camera.fov) / 360), 7) * (0.8 / 4);
+  const at = app.stage.project(spot.clone().setX(spot.x + 0.45 * size));
+  const box = canvas.getBoundingClientRect();
+  return [box.left + at.x, box.top + at.y];
+});
+
+/** A PNG as its sides and the colour at a place (shares of its sides, from above left). */
+export async function decoded(page, png) {
+  const { width, height, bytes } = await page.evaluate(async (base64) => {
+    const picture = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))]), { colorSpaceConversion: 'none' });
+    const { width, height } = picture;
+    const pen = new OffscreenCanvas(width, height).getContext('2d');
+    pen.drawImage(picture, 0, 0);
+    return { width, height, bytes: [...pen.getImageData(0, 0, width, height).data] };
+  }, png.toString('base64'));
+  const at = ([x, y]) => {
+    const first = 4 * (Math.floor(y * height) * width + Math.floor(x * width));
+    return bytes.slice(first, first + 3);
+  };
+  return { width, height, at };
+}

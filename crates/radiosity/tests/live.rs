@@ -528,6 +528,34 @@ fn an_early_edit_leaves_whole_rows() {
     assert!((after - 0.5).abs() < 0.15, "{after}");
 }
 
+/// Lights are dimmed and coloured by columns of light, walls are painted by rows: both are there.
+#[test]
+fn dimming_colouring_and_painting_trace_no_rays() {
+    for scene in [cornell_box(), furnished(), full()] {
+        let mut session = Session::new(scene, &small()).unwrap();
+        finish(&mut session);
+        let (rays, mut before) = (session.status().rays_traced, bits(&session));
+        let wall =
+            session.model().objects.iter().find(|object| object.reflectance.iter().all(|rho| *rho > 0.1)).unwrap().id;
+        // With very many the last one shares its column.
+        let (light, last) = (session.model().lights[0].id, session.model().lights.last().unwrap().id);
+        for edit in [
+            Edit::Light { light, dimming: 0.3, colour: [1.0; 3] },
+            Edit::Light { light, dimming: 0.3, colour: [1.0, 0.5, 0.2] },
+            Edit::Reflectance { object: wall, reflectance: [0.05, 0.4, 0.1] },
+            Edit::Light { light: last, dimming: 0.0, colour: [1.0; 3] },
+            Edit::Light { light: last, dimming: 1.0, colour: [1.0; 3] },
+        ] {
+            session.apply(&edit).unwrap();
+            finish(&mut session);
+            let after = bits(&session);
+            assert!(after != before, "{edit:?}");
+            assert_eq!(session.status().rays_traced, rays, "{edit:?}");
+            before = after;
+        }
+    }
+}
+
 #[test]
 fn undo_restores_every_bit() {
     let mut session = Session::new(furnished(), &small()).unwrap();

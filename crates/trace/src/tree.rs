@@ -177,7 +177,8 @@ impl Tree {
     }
 
     /// Takes some triangles out, all of which lie in the box `around` from its lower to its upper corner: no ray meets them any more.
-    /// Boxes stay as they are, so that rays look in vain where they were.
+    /// Boxes stay as they are, so that rays look in vain where they were. They still count in [`Tree::len`], and are
+    /// to [`Tree::validate`] as triangles that are not finite.
     pub fn take_out(&mut self, triangles: Range<u32>, around: [Vec3; 2]) {
         let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(0));
         while let Some(index) = open.pop() {
@@ -185,7 +186,7 @@ impl Tree {
             let meets = |slot: usize| {
                 (0..3).all(|axis| bounds[axis][slot] <= around[1][axis] && bounds[3 + axis][slot] >= around[0][axis])
             };
-            for slot in (0..WIDTH).filter(|slot| meets(*slot)) {
+            for slot in (0..WIDTH).filter(|slot| child[*slot] != Child::NONE && meets(*slot)) {
                 if !child[slot].is_leaf() {
                     open.push(child[slot].index());
                     continue;

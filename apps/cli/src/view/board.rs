@@ -3,7 +3,7 @@
 //! A notice has a key, and only the latest of a key is kept, under a revision that grows with each post. A page that
 //! remembers the last revision it was sent is owed exactly what is newer: a new page everything, one that was slow what it
 //! missed without what was outdated meanwhile. So nobody waits for a page and no page fills the memory. How far the solution is comes
-//! after the light that it tells of.
+//! after the light that it tells of, once a page has caught up.
 
 use axum::body::Bytes;
 use radiosity::session::Layer;
@@ -131,13 +131,13 @@ impl Posts {
 }
 
 /// What a page was sent.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Seen {
     notices: u64,
     status: u64,
     light: u64,
-    /// Light up to there goes before what is said of it.
-    before_status: Option<u64>,
+    /// How far the solution was, and the revision up to which light goes before that.
+    held: Option<(u64, Notice)>,
 }
 
 impl Seen {
@@ -241,8 +241,8 @@ impl Board {
         self.lock().awake().iter().any(|(_, watched)| !watched.is_known)
     }
 
-    /// The next notice that a page has not seen. How far the solution is comes last, and waits for light of the layer that the page looks
-    /// at: for what was there when it first had to, so that a slow page is told, too.
+    /// The next notice that a page has not seen. How far the solution is comes last, and waits for the light of a layer that is there.
+    /// What has to wait is not replaced by what is newer, so that a slow page is told, too.
     pub fn next_notice(&self, layer: Option<Layer>, seen: &mut Seen) -> Option<Notice> {
         let posts = self.lock();
         let mut others = posts.notices.after(seen.notices).filter(|(_, subject, _)| *subject != Subject::Status);
@@ -250,15 +250,22 @@ impl Board {
             seen.notices = revision;
             return Some(notice.clone());
         }
-        let (revision, status) = posts.notices.of(&Subject::Status).filter(|(revision, _)| *revision > seen.status)?;
-        let bound = *seen.before_status.get_or_insert(revision);
+        let (revision, status) = match &seen.held {
+            Some(held) => held.clone(),
+            None => posts
+                .notices
+                .of(&Subject::Status)
+                .filter(|(revision, _)| *revision > seen.status)
+                .map(|(revision, status)| (revision, status.clone()))?,
+        };
         let watched = posts.layers.iter().find(|(of, _)| Some(*of) == layer);
         let owed = watched.and_then(|(_, watched)| watched.light.after(seen.light).next());
-        if owed.is_some_and(|(revision, ..)| revision < bound) {
+        if owed.is_some_and(|(owed, ..)| owed < revision) {
+            seen.held = Some((revision, status));
             return None;
         }
-        (seen.status, seen.before_status) = (revision, None);
-        Some(status.clone())
+        (seen.status, seen.held) = (revision, None);
+        Some(status)
     }
 
     /// The next light of a layer that a page has not seen, about a frame of it.
@@ -329,12 +336,13 @@ mod tests {
         assert_eq!(next(&mut seen).as_deref(), Some("history"));
         assert_eq!((next(&mut seen), sent(&mut seen)), (None, Some(0)));
         assert_eq!(next(&mut seen), None);
-        // Light that is newer does not hold it up once more.
+        // What is newer does not hold it up, and waits for its own light.
         post(0, 2);
         say("brighter");
         assert_eq!(sent(&mut seen), Some(1));
+        assert_eq!(next(&mut seen).as_deref(), Some("lit"));
+        assert_eq!((next(&mut seen), sent(&mut seen)), (None, Some(0)));
         assert_eq!(next(&mut seen).as_deref(), Some("brighter"));
-        assert_eq!(sent(&mut seen), Some(0));
         assert_eq!((next(&mut seen), sent(&mut seen)), (None, None));
     }
 

@@ -245,7 +245,8 @@ async fn serve(place: Place, mut socket: WebSocket) {
     ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         news.mark_unchanged();
-        let layer = watch.as_ref().map(|watch| watch.layer);
+        // What a page has to know first is all that is not light.
+        let layer = watch.as_ref().filter(|_| is_caught_up).map(|watch| watch.layer);
         let mut next = server.board.next_notice(layer, &mut seen).map(|notice| match notice {
             Notice::Text(text) => Message::Text(text.into()),
             Notice::Binary(bytes) => Message::Binary(bytes),

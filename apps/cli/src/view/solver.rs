@@ -80,12 +80,33 @@ pub struct Solver {
     latency: Option<f64>,
     /// What pages wait for that takes its time: of each page one of a kind at most.
     measured: Vec<Asked>,
-    /// Since when rays have been traced without a change, and how many there were.
-    since: (Instant, u32),
+    /// How rays come, and how edges are found, since the last change.
+    tracing: Pace,
+    sharpening: Pace,
     /// Since when all rays have been there but for what edits have changed; none before.
     settling: Option<Instant>,
     /// Seconds that it took last from there to the end.
     settled: Option<f64>,
+}
+
+/// How quickly a share grows.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// Since when it is looked at, and how much it was then.
+    since: Option<(Instant, f64)>,
+}
+
+impl Pace {
+    /// Takes note of the share as it is.
+    fn note(&mut self, share: f64) {
+        self.since.get_or_insert_with(|| (Instant::now(), share));
+    }
+
+    /// Seconds until all of it is there, if it goes on as it went; none before it has grown.
+    fn left(&self, share: f64) -> Option<f64> {
+        let (since, first) = self.since.filter(|(_, first)| share > *first)?;
+        Some(since.elapsed().as_secs_f64() * (1.0 - share) / (share - first))
+    }
 }
 
 /// What a page waits for.
@@ -191,7 +212,8 @@ impl Solver {
             held: Vec::new(),
             latency: None,
             measured: Vec::new(),
-            since: (Instant::now(), 0),
+            tracing: Pace::default(),
+            sharpening: Pace::default(),
             settling: None,
             settled: None,
         };
@@ -337,7 +359,7 @@ impl Solver {
         (self.edited, self.is_done) = (self.edited.or(Some(since)), false);
         self.edits += 1;
         let status = self.session.status();
-        self.since = (Instant::now(), status.rays);
+        (self.tracing, self.sharpening) = Default::default();
         self.settling = (status.rays == status.most_rays).then(Instant::now);
         self.post_model();
         Ok(applied.inverse)
@@ -383,6 +405,10 @@ impl Solver {
                 self.changed.append(&mut self.back);
             }
             let status = self.session.status();
+            self.tracing.note(status.share);
+            if status.is_solved {
+                self.sharpening.note(status.sharpened);
+            }
             if self.is_done {
                 self.settled = self.settling.take().map(|since| since.elapsed().as_secs_f64()).or(self.settled);
             } else if status.rays == status.most_rays {

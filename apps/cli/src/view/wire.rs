@@ -238,6 +238,8 @@ pub struct Status {
     pub is_following: bool,
     pub rays: u32,
     pub most_rays: u32,
+    /// Share of all rays that are there.
+    pub share: f64,
     pub error: Option<f64>,
     pub seconds: f64,
     /// Seconds to the end, about.

@@ -2,6 +2,7 @@
 import type { App } from '../app';
 import { screenshot } from '../files';
 import { readable } from '../scale';
+import type { StatusNotice } from '../wire';
 import { button, choice, el } from './parts';
 
 export function bar(app: App, { help, fold }: { help(): void; fold(): void }): HTMLElement {
@@ -72,8 +73,7 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
   app.on('status', () => {
     const { status } = app;
     if (!status) return;
-    // Each doubling of rays is as long as all before; the bar shows time.
-    const share = status.is_done ? 100 : Math.min(99, (100 * status.rays) / Math.max(1, status.most_rays));
+    const share = status.is_done ? 100 : Math.min(99, 100 * status.share);
     progress.style.width = `${share}%`;
     progress.setAttribute('aria-valuenow', share.toFixed(0));
     progress.classList.toggle('done', status.is_done);
@@ -83,7 +83,7 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     error.textContent = status.error === null ? unknown : `noise ± ${percent(status.error)}`;
     // The time is that of all changes together: of the last alone it would be wrong.
     const took = status.edits > 0 ? 'done' : `done in ${duration(status.seconds)}`;
-    left.textContent = status.is_done ? took : status.left === null ? '' : `${duration(status.left)} left`;
+    left.textContent = status.is_done ? took : remaining(status);
   });
   return el('header', {},
     el('div', { class: 'track' }, progress),
@@ -98,6 +98,11 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
 
 export function percent(share: number): string {
   return `${readable(100 * share)} %`;
+}
+
+/** How long it will take to where that is known: edges of shadows come after all rays. */
+export function remaining({ left, rays, most_rays }: StatusNotice): string {
+  return left === null ? '' : `${duration(left)} ${rays < most_rays ? 'to all rays' : 'left'}`;
 }
 
 export function duration(seconds: number): string {

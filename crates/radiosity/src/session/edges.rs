@@ -6,7 +6,7 @@
 //! (Cohen, Greenberg, Immel and Brock 1986, "An efficient radiosity approach for realistic image synthesis"): what surfaces give off
 //! is that of whole elements still.
 //!
-//! Shadow rays to a lamp with area go to the same spots of it from all places, so that neighbours differ by what stands in between and by
+//! Shadow rays to a lamp with area go to the same spots of it from all places that are not next to it, so that neighbours differ by what stands in between and by
 //! no noise: the same number of other spots from each place made walls mottled. Its shadows are softer, and elements have fewer places.
 //!
 //! Left out are lights that share a column; sheets that light passes through; and facets of rounded bodies that the lamp grazes, on
@@ -55,6 +55,10 @@ const EVEN: f32 = 0.05;
 
 /// How many times the places that may be in the end are wanted before it is known which elements have an edge: those beside it have none.
 const LOOKED_AT: usize = 4;
+
+/// Places that are looked at in all, over those that are at first: what has an edge is looked at again. Measured: 1.2 in a box, 2.4 and
+/// 2.8 in furnished rooms.
+const AGAIN: f64 = 2.0;
 
 /// Where around a place light is looked for, in widths of a part: two squares, turned and of different sizes, so that no two are in a row
 /// along an edge, and as far as half way to the next places; opposite ones after each other. With one alone edges are stairs; these make them a part wide.
@@ -111,6 +115,9 @@ struct Search {
     wanted: Vec<Wanted>,
     /// Samples that are not there yet.
     missing: Vec<Sample>,
+    /// Places that have been looked at, and all that are to be as far as that is known.
+    looked: usize,
+    all: usize,
 }
 
 /// The light of a strand on an element.
@@ -152,6 +159,11 @@ pub struct Edges {
     search: Option<Search>,
     /// What was found as the lamps and what stands in their light are now.
     samples: BTreeMap<Sample, Found>,
+}
+
+/// Places at which samples are.
+fn in_all(samples: &[Sample]) -> usize {
+    samples.iter().map(|(.., parts)| places_of(parts.looked)).sum()
 }
 
 /// Bytes that so many places take, with what is looked at to find them.
@@ -277,6 +289,15 @@ impl Session {
         self.edges.cuts.range((object, 0)..(object + 1, 0)).map(|((_, element), cut)| (*element, cut))
     }
 
+    /// Share of the places to be looked at that has been.
+    pub(super) fn sharpened(&self) -> f64 {
+        match &self.edges.search {
+            _ if self.is_sharp() => 1.0,
+            Some(search) if search.revision == self.state.revision => search.looked as f64 / search.all.max(1) as f64,
+            _ => 0.0,
+        }
+    }
+
     /// Looks for edges until a time, at least for some.
     pub(super) fn sharpen(&mut self, deadline: Instant) {
         let revision = self.state.revision;
@@ -284,18 +305,22 @@ impl Session {
             Some(search) => search,
             None => {
                 let wanted = self.edges_in_sight();
-                Search { revision, missing: self.edges.missing(&wanted), wanted }
+                let missing = self.edges.missing(&wanted);
+                let places = in_all(&missing);
+                Search { revision, looked: 0, all: (AGAIN * places as f64) as usize, missing, wanted }
             }
         };
         if search.missing.is_empty() {
             // What has an edge is cut further.
             search.missing = self.edges.missing(&search.wanted);
+            search.all = search.looked + in_all(&search.missing);
         }
         if search.missing.is_empty() {
             return self.cut(&search);
         }
         loop {
             let some = search.missing.split_off(search.missing.len().saturating_sub(BATCH));
+            search.looked += in_all(&some);
             let found: Vec<_> = some.into_par_iter().map(|sample| (sample, self.sample(sample))).collect();
             self.edges.samples.extend(found);
             if search.missing.is_empty() || Instant::now() >= deadline {

@@ -127,6 +127,10 @@ pub struct Status {
     pub rays: u32,
     /// Rays per element at the end.
     pub most_rays: u32,
+    /// Share of all rays of elements that are traced, those that are not shown yet and those that an edit has dirtied among them.
+    pub share: f64,
+    /// Share of the places at which edges within elements are looked for that has been looked at, about.
+    pub sharpened: f64,
     /// One standard error of the irradiance by the rays of rows, relative, in the area-weighted mean square; that of shadow
     /// rays and of the elements' size are not in it. Infinite while dark, and after an edit until it is known of its light.
     pub error: f64,
@@ -397,6 +401,8 @@ impl Session {
             elements: elements as usize,
             rays: self.state.solved_rays,
             most_rays: most,
+            share: self.live.share(),
+            sharpened: self.sharpened(),
             error: self.state.error,
             residual: self.state.residual,
             rays_traced: self.live.rays_traced(),

@@ -387,7 +387,7 @@ impl Chunk {
                 has_changed |= self.set(work, e, self.at(e, m), entry(world, world.first(&ray, salt), direction));
             }
         }
-        let margin = 4.0 * world.offset;
+        let margin = world.margin();
         let nearest = cones.iter().map(|cone| cone.nearest).fold(f64::INFINITY, f64::min) - margin;
         let aims: SmallVec<[Aim; 4]> = cones.iter().map(|cone| cone.aim(&frame)).collect();
         let (in_part, at) = self.at(e, known.start);

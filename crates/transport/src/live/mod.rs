@@ -149,6 +149,17 @@ impl Live {
         self.rays_traced
     }
 
+    /// Share of all rays of rows that are there, dirty ones too.
+    pub fn share(&self) -> f64 {
+        let is_there = |chunk: &&Chunk| self.world.bodies[chunk.body].is_present;
+        let of = |(traced, elements): (u64, u64), chunk: &Chunk| {
+            let len = chunk.len as u64;
+            (traced + len * u64::from(chunk.traced()), elements + len)
+        };
+        let (traced, elements) = self.chunks.iter().filter(is_there).fold((0, 0), of);
+        traced as f64 / (elements * u64::from(self.most.rays)).max(1) as f64
+    }
+
     /// Rays of rows as asked for now.
     pub fn target(&self) -> Target {
         self.target
@@ -377,6 +388,10 @@ mod tests {
                     let [a, b, c, d] = quad;
                     triangles.extend([[a, b, c], [a, c, d]]);
                 }
+            }
+            if is_room {
+                // Without area, and so without a normal.
+                triangles.push([0.1, 0.3, 0.2].map(|x| at(x, x, 0.5)));
             }
             scene.add_triangles(name, 0, &triangles);
         }

@@ -214,6 +214,12 @@ impl World {
         self.apart.clear();
     }
 
+    /// How far outside its box a ray may meet an object: corners may be off by 2^-21 of the distance to the far side of the scene,
+    /// which is eight half extents at the most.
+    pub fn margin(&self) -> f64 {
+        8.0 * self.offset
+    }
+
     /// The object of a triangle.
     pub fn body_of(&self, triangle: u32) -> usize {
         self.body_of[triangle as usize] as usize
@@ -241,15 +247,16 @@ impl World {
             {
                 first = Some(met);
             }
-            first.map_or(ray.t_max, |best| best.key)
+            first.map_or(f32::INFINITY, |best| best.key)
         };
-        let mut key = ray.t_max;
+        let mut key = f32::INFINITY;
         match &self.joint {
             Some(joint) => key = compete(self.first_of_joint(joint, ray, salt, key)),
             None => {
                 let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
                 for body in self.apart.iter().map(|body| *body as usize) {
-                    if self.bodies[body].bounds.may_meet(origin, direction, f64::from(key), 4.0 * self.offset) {
+                    let length = f64::from(key.min(ray.t_max));
+                    if self.bodies[body].bounds.may_meet(origin, direction, length, self.margin()) {
                         key = compete(self.first_of(body, ray, salt, key));
                     }
                 }

@@ -112,17 +112,12 @@ impl Solver {
 
     pub(super) fn post_status(&self) {
         let status = self.session.status();
-        let (start, first) = self.since;
-        let traced = status.rays.saturating_sub(first);
-        let left = match traced {
-            0 => None,
-            _ => Some(start.elapsed().as_secs_f64() * f64::from(status.most_rays - status.rays) / f64::from(traced)),
-        };
-        // When all rays are there it takes about as long as the last time.
+        // After a change that finds all rays it takes about as long as the last time.
         let left = match (self.settling, self.settled) {
             (Some(since), Some(took)) => Some((took - since.elapsed().as_secs_f64()).max(0.0)),
+            (Some(_), None) if status.is_solved => self.sharpening.left(status.sharpened),
             (Some(_), None) => None,
-            _ => left,
+            _ => self.tracing.left(status.share),
         };
         let doing = match (self.is_done, self.edited.is_some()) {
             (true, _) => match self.latency {
@@ -140,6 +135,7 @@ impl Solver {
             is_following: self.edited.is_some(),
             rays: status.rays,
             most_rays: status.most_rays,
+            share: status.share,
             error: Some(status.error).filter(|error| error.is_finite()),
             seconds: status.seconds,
             left: left.filter(|_| !self.is_done),

@@ -40,7 +40,7 @@ impl<'a> Dirt<'a> {
     /// where the object is now it tells itself.
     pub fn new(world: &'a World, changes: &[Change]) -> Dirt<'a> {
         let mut dirt = Dirt { bodies: Vec::new(), before: Vec::new(), now: Vec::new(), ids: (0, 0) };
-        let margin = 4.0 * world.offset;
+        let margin = world.margin();
         let around = |bounds: Bounds| {
             let (centre, radius) = bounds.ball();
             (bounds, (centre, radius + margin))
@@ -70,7 +70,8 @@ impl<'a> Dirt<'a> {
                 continue;
             }
             let distance = along.length();
-            if distance <= 1.001 * reach {
+            // What has no area has no normal, and rays of any length in any direction.
+            if distance <= 1.001 * reach || site.normal == DVec3::ZERO {
                 cones.clear();
                 cones.push(Cone { axis: site.normal, cosine: None, nearest: 0.0 });
                 break;

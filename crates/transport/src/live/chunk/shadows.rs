@@ -53,7 +53,7 @@ impl Chunk {
             Part::Near => 0..known.min(NEAR_SHADOWS),
             Part::Far => NEAR_SHADOWS.min(known)..known,
         };
-        let (world, margin) = (work.world, 4.0 * work.world.offset);
+        let (world, margin) = (work.world, work.world.margin());
         // What the first part has made rough the rest makes whole, though nothing of its own is dirty: an object that went away and
         // came back was elsewhere meanwhile, for the first part only.
         let is_rough = |e: usize| part == Part::Far && self.shadows[column].is_rough[e];
