@@ -27,6 +27,8 @@ test('everything is reached by keyboard alone', async () => {
   assert.ok(probe.lights.length > 0 && probe.surfaces.length > 0);
   await page.keyboard.press('g');
   assert.ok((await state(page)).grid.count > 4, 'a grid');
+  // Its numbers are those of the picture until its own rays have come.
+  await page.waitForFunction(() => window.radiosity.app.measuring.grid.answer !== null);
   // False colours, isolines, edges and rays: what the panel shows of them, and what is drawn.
   const shown = () => page.evaluate(() => {
     const { app } = window.radiosity;
