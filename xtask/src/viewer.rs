@@ -12,9 +12,6 @@ const NODE: u32 = 20;
 /// Names of the browser whose engine the tests are written for.
 const BROWSERS: &[&str] = &["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// The tests, each with a program and a browser of its own.
-const TESTS: &[&str] = &["test/page.test.mjs", "test/edit.test.mjs", "test/keys.test.mjs", "test/walk.test.mjs"];
-
 /// `cargo xtask viewer`.
 pub fn command(arguments: &[&str]) -> Result<String, Fault> {
     let root = crate::root();
@@ -53,12 +50,23 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
             for name in names {
                 tests.args(["--test-name-pattern", name]);
             }
-            tests.args(TESTS).env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
+            tests.args(tests_in(&viewer)?).env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
             run(&mut tests)?;
             Ok("viewer: all tests passed".to_owned())
         }
         _ => Err(Fault::Usage("'viewer' takes nothing, '--check', or '--test [NAME]...'".to_owned())),
     }
+}
+
+/// The files of tests, each with a program and a browser of its own.
+fn tests_in(viewer: &Path) -> Result<Vec<PathBuf>, Fault> {
+    let folder = viewer.join("test");
+    let entries =
+        std::fs::read_dir(&folder).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(Fault::at(&folder))?;
+    let mut tests: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).collect();
+    tests.retain(|path| path.to_string_lossy().ends_with(".test.mjs"));
+    tests.sort();
+    Ok(tests)
 }
 
 /// What the page is made of, as the lock file says.
@@ -75,7 +83,8 @@ fn check(version: Option<&str>) -> Result<(), Fault> {
     if major.is_some_and(|major| major >= NODE) {
         return Ok(());
     }
-    let there = version.map_or_else(|| "there is none".to_owned(), |version| format!("there is {}", version.trim()));
+    let version = version.map(str::trim).filter(|version| !version.is_empty());
+    let there = version.map_or_else(|| "there is none".to_owned(), |version| format!("there is {version}"));
     Err(Fault::Viewer(format!(
         "Node.js {NODE} or newer is needed, {there}; install it with npm (https://nodejs.org). The program itself is built without"
     )))
@@ -127,7 +136,7 @@ mod tests {
     fn node_that_is_missing_or_old_is_named() {
         let refused = |version| check(version).unwrap_err().to_string();
         for (version, there) in
-            [(None, "there is none"), (Some("v18.19.0\n"), "there is v18.19.0;"), (Some(""), "there is")]
+            [(None, "there is none;"), (Some("v18.19.0\n"), "there is v18.19.0;"), (Some("\n"), "there is none;")]
         {
             let text = refused(version);
             assert!(text.contains(&format!("Node.js {NODE} or newer is needed")) && text.contains(there), "{text}");

@@ -173,15 +173,16 @@ export class App {
         break;
       }
       case 'object':
+        this.hold();
         this.adding.hearObject(notice);
         this.objectsAhead.hear(notice);
         break;
       case 'light':
+        this.hold();
         this.hearLight(notice);
         break;
       case 'status':
-        // Another page may have changed something.
-        if (this.status && notice.edits !== this.status.edits) this.exposure.hold();
+        if (this.status && notice.edits !== this.status.edits) this.hold();
         this.adding.hearStatus(notice);
         this.status = notice;
         this.tell('status');
@@ -331,6 +332,11 @@ export class App {
       this.textures.set(key, texture);
     }
     return texture;
+  }
+
+  /** Another page may have changed something. */
+  private hold(): void {
+    if (this.isCaughtUp) this.exposure.hold();
   }
 
   private shine(frame: LightFrame): void {
@@ -631,6 +637,7 @@ export class App {
     for (const surface of this.stage.surfaces.values()) this.stage.darken(surface);
     shared.emissionShown.value = layer === 'total' || layer === 'direct' ? 1 : 0;
     this.connection.look(layer);
+    this.exposure.isBlind = isError(layer);
     this.exposure.free();
     this.paintMode();
   }

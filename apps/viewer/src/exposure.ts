@@ -24,6 +24,8 @@ export class Exposure {
   range: [number, number] = [10, 1000];
   isRangeAutomatic = true;
   levels: number[] = [];
+  /** What is shown is not light: eyes stay as they are. */
+  isBlind = false;
   /** What the meter saw last, and from where. */
   seen: { picture: Float32Array; view: string } | null = null;
   private wanted = 0;
@@ -124,7 +126,7 @@ export class Exposure {
     }
     this.seen = { picture: seen.picture, view };
     // In the dark eyes stay as they are.
-    if (this.isAutomatic && seen.luminance.length > 0) {
+    if (this.isAutomatic && !this.isBlind && seen.luminance.length > 0) {
       seen.luminance.sort((a, b) => a - b);
       const at = (share: number) => Math.max(seen.luminance[Math.floor((seen.luminance.length - 1) * share)], 1e-30);
       const chosen = Math.log2(Math.min(0.24 / at(0.5), 0.8 / at(0.9)));

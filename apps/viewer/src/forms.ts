@@ -63,7 +63,11 @@ export function boxAhead(stage: Stage, metre: number, name: string): NewObject {
 export function panelAhead(stage: Stage, metre: number, name: string, isLampOrAdded: (object: number) => boolean): NewObject[] {
   const side = Math.max(PANEL * metre, LEAST * stage.bounds.getSize(new Vector3()).length());
   const scale = side / PANEL;
-  const place = onCeiling(stage, side, scale, isLampOrAdded) ?? hung(stage, metre, inSight(stage, metre));
+  const hit = stage.pick(0, 0);
+  // Who looks out of a window has the ceiling of the room.
+  const starts = [...(hit ? [hit.point.clone().addScaledVector(hit.normal, BELOW * scale)] : []), inSight(stage, scale)];
+  const found = starts.map((from) => onCeiling(stage, from, side, scale, isLampOrAdded)).find((place) => place !== null);
+  const place = found ?? hung(stage, metre, inSight(stage, metre));
   const matrix = standing(stage, place, true);
   const shining = side - 2 * RIM * scale;
   const exitance = (FLUX * scale * scale) / shining ** 2;
@@ -74,9 +78,8 @@ export function panelAhead(stage: Stage, metre: number, name: string, isLampOrAd
   ];
 }
 
-function onCeiling(stage: Stage, side: number, scale: number, isLampOrAdded: (object: number) => boolean): Vector3 | null {
-  const hit = stage.pick(0, 0);
-  const from = hit ? hit.point.clone().addScaledVector(hit.normal, BELOW * scale) : inSight(stage, scale);
+/** The place of a panel above another place, if something is there. */
+function onCeiling(stage: Stage, from: Vector3, side: number, scale: number, isLampOrAdded: (object: number) => boolean): Vector3 | null {
   const first = stage.cast(from, UP, Infinity, DoubleSide);
   if (!first) return null;
   from.y += Math.max(0.5 * first.distance, first.distance - 2 * BELOW * scale);

@@ -52,6 +52,7 @@ export class Navigator {
   /** As long as a metre is to people who fit into the scene. */
   scale = 1;
   private dragged: number | null = null;
+  private fingers = new Set<number>();
   private last: [number, number] = [0, 0];
 
   constructor(private stage: Stage) {
@@ -66,7 +67,10 @@ export class Navigator {
     canvas.addEventListener('pointerdown', (event) => {
       canvas.focus({ preventScroll: true });
       if (this.mode !== 'walk' || this.held || event.button > 1 || document.pointerLockElement) return;
-      if (this.dragged === null) {
+      this.fingers.add(event.pointerId);
+      // One finger turns the head; two do nothing that either of them would.
+      if (this.fingers.size > 1) this.dragged = null;
+      else {
         this.dragged = event.pointerId;
         this.last = [event.clientX, event.clientY];
         canvas.setPointerCapture(event.pointerId);
@@ -84,6 +88,7 @@ export class Navigator {
       this.turn(x * DRAG, y * DRAG);
     });
     const release = (event: PointerEvent) => {
+      this.fingers.delete(event.pointerId);
       if (event.pointerId === this.dragged) this.dragged = null;
     };
     canvas.addEventListener('pointerup', release);

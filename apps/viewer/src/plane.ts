@@ -69,7 +69,7 @@ export function lateness({ measuring: { plane, grid }, status, layer }: App): st
   if (!plane && (!grid || layer !== 'total')) return '';
   const answer = plane ? plane.answer : grid!.answer;
   if (!answer) return 'Measuring …';
-  if (status && answer.edits !== status.edits) return 'The numbers are those before the last change; new ones are on their way.';
+  if (status && answer.edits < status.edits) return 'The numbers are those before the last change; new ones are on their way.';
   return answer.is_done ? '' : 'The light still gets finer; the numbers follow.';
 }
 

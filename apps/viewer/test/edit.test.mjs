@@ -243,11 +243,27 @@ test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a
   probe.radiosity.forEach((read, band) => assert.ok(Math.abs(read - probe.reflectance[band] * probe.irradiance[band]) < 1e-4 * read));
   assert.match(await page.locator('#meter').innerText(), /Reflectance\s+20\.8 %/);
 
-  const before = await luxOf(page, 50);
-  await page.evaluate(() => window.radiosity.app.undo());
+  // More than all of a colour is as much of it as there may be, and no other colour.
+  await page.getByLabel('Mean reflectance, percent').fill('150');
+  await page.keyboard.press('Enter');
   await done(page, edits + 4);
-  await page.evaluate(() => window.radiosity.app.redo());
+  const { reflectance } = await named(page, 'left');
+  reflectance.forEach((read, band) => assert.ok(Math.abs(read - [0.165, 0.33, 0.99][band]) < 1e-4, `${reflectance}`));
+  assert.match((await state(page)).message, /34 % is the most of this one/);
+  await page.evaluate(() => window.radiosity.app.undo());
   await done(page, edits + 5);
+
+  const before = await luxOf(page, 50);
+  assert.match((await state(page)).undo, /^dim /);
+  await page.evaluate(() => window.radiosity.app.undo());
+  await done(page, edits + 6);
+  await page.evaluate(() => window.radiosity.app.redo());
+  await done(page, edits + 7);
+  const { id } = lights[0];
+  await page.evaluate((id) => window.radiosity.app.setLight(window.radiosity.app.lights.get(id), { colour: [1, 0.8, 0.6] }), id);
+  await page.waitForFunction(() => /^colour /.test(window.radiosity.state().undo));
+  await page.evaluate(() => window.radiosity.app.undo());
+  await done(page, edits + 9);
   assert.deepEqual(await luxOf(page, 50), before, 'undone and done again, light is the same to the last bit');
   await restored(page);
   assert.deepEqual(page.faults, []);

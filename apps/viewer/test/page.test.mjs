@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { curves, shown } from './display.mjs';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, picture, pixelsOf, restored, state, stuck, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, picture, pixels, pixelsOf, restored, state, stuck, view } from './program.mjs';
 import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
@@ -356,6 +356,27 @@ test('a click brings the meter into view, and after a change no time is told tha
   await page.context().close();
 });
 
+test('noise is shown in false colours, and the eye stays as it was', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  await pixels(page);
+  const lit = () => page.evaluate(() => document.querySelector('#colours [aria-checked=true]').dataset.value);
+  const { exposure } = await state(page);
+  assert.equal(await lit(), 'eye');
+  await page.locator('#layer').selectOption('"relative_error"');
+  await done(page);
+  await pixels(page);
+  assert.equal(await lit(), 'lux');
+  const [low, high] = await page.evaluate(() => window.radiosity.app.exposure.range);
+  assert.ok(low > 0 && high < 100, `${low} to ${high} %`);
+  assert.equal((await state(page)).exposure, exposure);
+  // As seen there is light alone.
+  await page.locator('#colours [data-value=eye]').click();
+  assert.deepEqual([await lit(), (await state(page)).layer], ['eye', 'total']);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('how long it will take is told while light comes', async () => {
   const lit = await view('--elements', '20000', '--rays', '1024');
   const page = await pages.open(lit.url);
@@ -370,20 +391,21 @@ test('how long it will take is told while light comes', async () => {
     }
     return told;
   });
-  // To all rays first.
-  const end = told.find(({ rays, most }) => rays === most).now;
+  // To all rays first. Other programs may come and go meanwhile; without any the middle is 1.5.
+  const end = told.find(({ rays, most }) => rays === most)?.now;
+  assert.ok(end, 'all rays are there before the end');
   const ratios = told.filter(({ left, now }) => left !== null && end - now > 400)
     .map(({ left, now, text }) => {
-      assert.match(text, /^\d+(\.\d)? s to all rays$/);
+      assert.match(text, /^\d+(\.\d)? (s|min) to all rays$/);
       return (1000 * left) / (end - now);
     }).sort((a, b) => a - b);
   const [low, middle, high] = [0.1, 0.5, 0.9].map((share) => ratios[Math.floor(share * ratios.length)]);
   console.log(`seconds told over those that it took, ${ratios.length} times: ${[low, middle, high].map((x) => x.toFixed(2))}`);
-  assert.ok(ratios.length > 10 && middle > 0.4 && middle < 2.5, `${ratios}`);
+  assert.ok(ratios.length > 10 && middle > 0.4 && middle < 4, `${ratios}`);
   told.slice(1).forEach(({ share }, i) => assert.ok(share >= told[i].share && share < 100, 'the bar goes on'));
   // Then to the sharp edges.
   const after = told.filter(({ left, rays, most }) => left !== null && rays === most);
-  assert.ok(after.some(({ text }) => /^\d.* s left$/.test(text)), JSON.stringify(after));
+  assert.ok(after.some(({ text }) => /^\d.* (s|min) left$/.test(text)), JSON.stringify(after));
   assert.deepEqual(page.faults, []);
   await page.context().close();
   await lit.end();
@@ -728,6 +750,9 @@ test('without the token, and from elsewhere, there is no page', async () => {
   assert.equal(await status('/00000000000000000000000000000000/'), 403);
   assert.equal(await status(url.pathname, { origin: 'http://evil.example' }), 403);
   assert.equal(await status(url.pathname), 200);
+  // Who leaves out the last slash is led there; who leaves out more is not.
+  assert.equal(await status(url.pathname.slice(0, -1)), 200);
+  assert.equal(await status(url.pathname.slice(0, -2)), 403);
   const page = await pages.open(program.url);
   const refused = (address) => page.evaluate((address) => new Promise((done) => {
     const socket = new WebSocket(address);

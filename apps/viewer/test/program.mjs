@@ -157,7 +157,9 @@ async function quiet(page) {
 /** The picture, once nothing has been drawn for a while: exposure has arrived, and a slow machine shows all pixels again. */
 export async function pixels(page) {
   const drawn = () => page.evaluate(() => window.radiosity.app.stage.frames);
+  const deadline = Date.now() + 120_000;
   for (let last = -1, now = await drawn(); now !== last; now = await drawn()) {
+    if (Date.now() > deadline) throw new Error('the page never rests');
     last = now;
     await page.waitForTimeout(700);
   }

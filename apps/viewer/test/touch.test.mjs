@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { done, handleOf, picture, restored, state } from './program.mjs';
+import { done, handleOf, picture, pixels, restored, state } from './program.mjs';
 
 const { program, pages } = await started();
 
@@ -44,7 +44,8 @@ test('a thumb walks by the stick, a finger turns the head, and two fingers come 
   await page.waitForTimeout(300);
   assert.deepEqual((await camera()).place, walked.place, 'lifted, it stands');
   // Down is back.
-  await gesture(page, [middle], [[0, 40]], () => page.waitForTimeout(300));
+  await gesture(page, [middle], [[0, 40]], () => page.waitForFunction((place) =>
+    window.radiosity.app.stage.camera.position.toArray().some((x, k) => Math.abs(x - place[k]) > 0.02), walked.place));
   assert.ok(along(walked, await camera()) < -0.01);
 
   // The picture goes with the finger: to the right, and one looks to the left. Nothing is picked by that.
@@ -55,6 +56,10 @@ test('a thumb walks by the stick, a finger turns the head, and two fingers come 
   const across = before.ahead[2] * turned.ahead[0] - before.ahead[0] * turned.ahead[2];
   assert.ok(Math.abs(across - Math.sin(80 * 0.0042)) < 0.01, `${across}`);
   assert.equal((await state(page)).probe, null);
+
+  // Two of them do nothing that either alone would.
+  await gesture(page, [[300, 150], [380, 150]], [[-60, 0], [60, 0]]);
+  assert.deepEqual(await camera(), turned);
 
   await page.evaluate(() => window.radiosity.app.walk('orbit'));
   await page.locator('.stick').waitFor({ state: 'hidden' });
@@ -79,7 +84,8 @@ test('a thing is dragged by a finger, and light follows', async () => {
     app.select(id);
     return id;
   });
-  await page.waitForTimeout(300);
+  // What can be taken hold of is where it was drawn last.
+  await pixels(page);
   const handle = await handleOf(page);
   await gesture(page, [handle], [[-50, 0]], async () => assert.ok((await state(page)).isDragging, 'the handle is held'));
   await done(page, edits + 1);

@@ -528,6 +528,32 @@ fn an_early_edit_leaves_whole_rows() {
     assert!((after - 0.5).abs() < 0.15, "{after}");
 }
 
+/// Shares of what is done grow to one, and are less where something is added.
+#[test]
+fn how_much_is_done_is_told() {
+    let mut session = Session::new(cornell_box(), &SessionOptions { places: 4000, ..small() }).unwrap();
+    let mut last = session.status();
+    assert_eq!((last.share, last.sharpened), (0.0, 0.0));
+    let mut shares = 0;
+    while !session.step(Duration::from_millis(1)).is_done {
+        let status = session.status();
+        assert!(last.share <= status.share && status.share <= 1.0, "{status:?}");
+        assert!((0.0..=1.0).contains(&status.sharpened) && (status.sharpened == 0.0 || status.is_solved), "{status:?}");
+        shares += usize::from(last.share < status.share);
+        last = status;
+    }
+    let status = session.status();
+    assert!(shares > 3 && (status.share, status.sharpened) == (1.0, 1.0), "{shares} {status:?}");
+    let object = session.model().objects.iter().find(|object| object.name == "short block").unwrap().id;
+    session
+        .apply(&Edit::Copy { object, matrix: glam::DMat4::from_translation(glam::DVec3::X).to_cols_array() })
+        .unwrap();
+    let status = session.status();
+    assert!(status.share < 1.0 && status.sharpened == 0.0, "{status:?}");
+    finish(&mut session);
+    assert_eq!(session.status().share, 1.0);
+}
+
 /// Lights are dimmed and coloured by columns of light, walls are painted by rows: both are there.
 #[test]
 fn dimming_colouring_and_painting_trace_no_rays() {

@@ -3,7 +3,7 @@
 //! A notice has a key, and only the latest of a key is kept, under a revision that grows with each post. A page that
 //! remembers the last revision it was sent is owed exactly what is newer: a new page everything, one that was slow what it
 //! missed without what was outdated meanwhile. So nobody waits for a page and no page fills the memory. How far the solution is comes
-//! after the light that it tells of, once a page has caught up.
+//! after the light that it tells of, or what has replaced that, once a page has caught up.
 
 use axum::body::Bytes;
 use radiosity::session::Layer;
@@ -136,14 +136,28 @@ pub struct Seen {
     notices: u64,
     status: u64,
     light: u64,
-    /// How far the solution was, and the revision up to which light goes before that.
-    held: Option<(u64, Notice)>,
+    held: Option<Held>,
+}
+
+/// How far the solution was, which waits for light.
+#[derive(Clone, Debug)]
+struct Held {
+    revision: u64,
+    status: Notice,
+    /// The revision up to which light goes before it.
+    light: u64,
 }
 
 impl Seen {
-    /// Another layer is looked at: none of its light was sent.
+    /// Another layer is looked at: none of its light was sent, and how far that is is told after it.
     pub fn forget_light(&mut self) {
         self.light = 0;
+        self.forget_status();
+    }
+
+    /// How far the solution is is told again, after the light.
+    pub fn forget_status(&mut self) {
+        (self.status, self.held) = (0, None);
     }
 }
 
@@ -241,31 +255,35 @@ impl Board {
         self.lock().awake().iter().any(|(_, watched)| !watched.is_known)
     }
 
-    /// The next notice that a page has not seen. How far the solution is comes last, and waits for the light of a layer that is there.
-    /// What has to wait is not replaced by what is newer, so that a slow page is told, too.
+    /// The next notice that a page has not seen. How far the solution is comes last, and waits for the light of a layer: for what there
+    /// was of it then, and is not replaced by newer light, so that a slow page is told, too. What has to wait is not replaced by what is newer.
     pub fn next_notice(&self, layer: Option<Layer>, seen: &mut Seen) -> Option<Notice> {
-        let posts = self.lock();
+        let mut posts = self.lock();
+        let is_coming = posts.awake().iter().any(|(of, watched)| Some(*of) == layer && !watched.is_known);
         let mut others = posts.notices.after(seen.notices).filter(|(_, subject, _)| *subject != Subject::Status);
         if let Some((revision, _, notice)) = others.next() {
             seen.notices = revision;
             return Some(notice.clone());
         }
-        let (revision, status) = match &seen.held {
-            Some(held) => held.clone(),
-            None => posts
-                .notices
-                .of(&Subject::Status)
-                .filter(|(revision, _)| *revision > seen.status)
-                .map(|(revision, status)| (revision, status.clone()))?,
+        let held = match seen.held.take() {
+            Some(held) => held,
+            None => {
+                let (revision, status) =
+                    posts.notices.of(&Subject::Status).filter(|(revision, _)| *revision > seen.status)?;
+                if is_coming {
+                    return None;
+                }
+                Held { revision, status: status.clone(), light: posts.revision }
+            }
         };
         let watched = posts.layers.iter().find(|(of, _)| Some(*of) == layer);
         let owed = watched.and_then(|(_, watched)| watched.light.after(seen.light).next());
-        if owed.is_some_and(|(owed, ..)| owed < revision) {
-            seen.held = Some((revision, status));
+        if owed.is_some_and(|(owed, ..)| owed <= held.light) {
+            seen.held = Some(held);
             return None;
         }
-        (seen.status, seen.held) = (revision, None);
-        Some(status)
+        seen.status = held.revision;
+        Some(held.status)
     }
 
     /// The next light of a layer that a page has not seen, about a frame of it.
@@ -344,6 +362,27 @@ mod tests {
         assert_eq!((next(&mut seen), sent(&mut seen)), (None, Some(0)));
         assert_eq!(next(&mut seen).as_deref(), Some("brighter"));
         assert_eq!((next(&mut seen), sent(&mut seen)), (None, None));
+        // To a page that looks at it anew it is told anew, after all of the light.
+        seen.forget_light();
+        assert_eq!((next(&mut seen), sent(&mut seen)), (None, Some(1)));
+        assert_eq!((next(&mut seen), sent(&mut seen)), (None, Some(0)));
+        assert_eq!(next(&mut seen).as_deref(), Some("brighter"));
+        // Of a layer that nobody has posted yet nothing is told before that; of one that rests at once.
+        let other = Layer::Direct;
+        board.watch(other);
+        seen.forget_light();
+        assert!(board.next_notice(Some(other), &mut seen).is_none());
+        board.layers();
+        board.post_light(other, 0, &[1; 3]);
+        assert!(board.next_notice(Some(other), &mut seen).is_none());
+        assert_eq!(board.next_light(other, &mut seen).len(), 1);
+        assert!(board.next_notice(Some(other), &mut seen).is_some());
+        (1..=MOST_LAYERS as u32).for_each(|bounce| board.watch(Layer::Bounce(bounce)));
+        assert!(board.is_resting(layer));
+        seen.forget_light();
+        while board.next_notice(Some(layer), &mut seen).is_none() {
+            assert!(!board.next_light(layer, &mut seen).is_empty());
+        }
     }
 
     #[test]

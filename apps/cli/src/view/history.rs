@@ -128,12 +128,16 @@ pub fn targets(edit: &Edit) -> Vec<Target> {
     }
 }
 
-/// What people call an edit.
+/// What people call an edit of the model as it is before.
 pub fn label(edit: &Edit, model: &Model) -> String {
     let object = |id: &ObjectId| object_name(*id, model);
     let light = |id: &LightId| light_name(*id, model);
     match edit {
-        Edit::Light { light: id, .. } => format!("dim {}", light(id)),
+        Edit::Light { light: id, colour, .. } => {
+            let known = model.lights.iter().find(|light| light.id == *id);
+            let is_coloured = known.is_some_and(|known| known.colour != *colour);
+            format!("{} {}", if is_coloured { "colour" } else { "dim" }, light(id))
+        }
         Edit::MoveLight { light: id, .. } => format!("move {}", light(id)),
         Edit::ChangeLight { light: id, .. } => format!("change {}", light(id)),
         Edit::Add { object } if object.name.is_empty() => "add an object".to_owned(),

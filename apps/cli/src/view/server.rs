@@ -11,7 +11,7 @@ use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, Request as HttpRequest, State};
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
 use radiosity::session::{Layer, MOST_BOUNCES};
 use radiosity::{Scene, Texture};
@@ -80,6 +80,7 @@ impl Server {
     /// All that is answered.
     pub fn router(self: &Arc<Server>) -> Router {
         Router::new()
+            .route("/{token}", get(home))
             .route("/{token}/", get(page))
             .route("/{token}/socket", get(socket))
             .route("/{token}/texture/{file}", get(texture))
@@ -112,6 +113,11 @@ async fn guarded(State(server): State<Arc<Server>>, request: HttpRequest, next: 
         response.headers_mut().insert(name, HeaderValue::from_static(value));
     }
     response
+}
+
+/// The page, for who left out the last slash.
+async fn home(Path(token): Path<String>) -> Redirect {
+    Redirect::permanent(&format!("/{token}/"))
 }
 
 async fn page() -> Response {
@@ -253,6 +259,7 @@ async fn serve(place: Place, mut socket: WebSocket) {
         });
         if next.is_none() && !is_caught_up {
             is_caught_up = true;
+            seen.forget_status();
             next = Some(Message::Text(Say::CaughtUp.text().into()));
         }
         if let (None, Some(watch)) = (&next, &mut watch) {

@@ -81,22 +81,25 @@ pub struct Solver {
     /// What pages wait for that takes its time: of each page one of a kind at most.
     measured: Vec<Asked>,
     /// How rays come, and how edges are found, since the last change.
-    tracing: Pace,
-    sharpening: Pace,
+    tracing: Growth,
+    sharpening: Growth,
     /// Since when all rays have been there but for what edits have changed; none before.
     settling: Option<Instant>,
     /// Seconds that it took last from there to the end.
     settled: Option<f64>,
 }
 
+/// Least growth of a share by which it is told when all of it is there: the first moments are not like the others.
+const LEAST_GROWTH: f64 = 0.02;
+
 /// How quickly a share grows.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pace {
+struct Growth {
     /// Since when it is looked at, and how much it was then.
     since: Option<(Instant, f64)>,
 }
 
-impl Pace {
+impl Growth {
     /// Takes note of the share as it is.
     fn note(&mut self, share: f64) {
         self.since.get_or_insert_with(|| (Instant::now(), share));
@@ -104,7 +107,7 @@ impl Pace {
 
     /// Seconds until all of it is there, if it goes on as it went; none before it has grown.
     fn left(&self, share: f64) -> Option<f64> {
-        let (since, first) = self.since.filter(|(_, first)| share > *first)?;
+        let (since, first) = self.since.filter(|(_, first)| share >= *first + LEAST_GROWTH)?;
         Some(since.elapsed().as_secs_f64() * (1.0 - share) / (share - first))
     }
 }
@@ -212,8 +215,8 @@ impl Solver {
             held: Vec::new(),
             latency: None,
             measured: Vec::new(),
-            tracing: Pace::default(),
-            sharpening: Pace::default(),
+            tracing: Growth::default(),
+            sharpening: Growth::default(),
             settling: None,
             settled: None,
         };
@@ -315,15 +318,18 @@ impl Solver {
 
     fn answer(&mut self, page: u64, request: &Request, since: Instant) -> Option<String> {
         match request {
-            Request::Edit { edit, gesture } => match self.apply(edit, since) {
-                Ok(inverse) => {
-                    let gesture: Option<Gesture> = gesture.map(|gesture| (page, gesture));
-                    self.history.did(history::label(edit, &self.model), inverse, gesture);
-                    self.post_history();
-                    None
+            Request::Edit { edit, gesture } => {
+                let label = history::label(edit, &self.model);
+                match self.apply(edit, since) {
+                    Ok(inverse) => {
+                        let gesture: Option<Gesture> = gesture.map(|gesture| (page, gesture));
+                        self.history.did(label, inverse, gesture);
+                        self.post_history();
+                        None
+                    }
+                    Err(error) => Some(unchanged(&error, &self.model)),
                 }
-                Err(error) => Some(unchanged(&error, &self.model)),
-            },
+            }
             Request::Undo {} | Request::Redo {} => {
                 let is_undo = *request == Request::Undo {};
                 let next = if is_undo { self.history.next_undo() } else { self.history.next_redo() };
@@ -405,7 +411,10 @@ impl Solver {
                 self.changed.append(&mut self.back);
             }
             let status = self.session.status();
-            self.tracing.note(status.share);
+            // The first picture of an edit takes no rays of those that are missing.
+            if self.edited.is_none() {
+                self.tracing.note(status.share);
+            }
             if status.is_solved {
                 self.sharpening.note(status.sharpened);
             }
@@ -552,6 +561,19 @@ mod tests {
     use super::super::wire::CUTS;
     use super::*;
     use radiosity::session::{PlaneQuestion, SessionOptions};
+
+    #[test]
+    fn what_is_left_is_told_by_what_has_grown() {
+        let mut growth = Growth::default();
+        assert_eq!(growth.left(0.5), None);
+        growth.since = Instant::now().checked_sub(Duration::from_secs(10)).map(|since| (since, 0.25));
+        growth.note(0.26);
+        assert_eq!((growth.left(0.25), growth.left(0.26), growth.left(0.1)), (None, None, None));
+        for (share, seconds) in [(0.5, 20.0), (0.75, 5.0), (1.0, 0.0)] {
+            let left = growth.left(share).unwrap();
+            assert!((left - seconds).abs() < 0.1 + 0.01 * seconds, "{left} {seconds}");
+        }
+    }
 
     /// Of what two pages drag only the latest waits, each page's own, whatever else they look at meanwhile; an undo comes after.
     #[test]

@@ -8,8 +8,14 @@ import { luminance } from '../luminance';
 import { coordinate } from '../scale';
 import { button, choice, el, fill, fillNumber, hex, linear, section } from './parts';
 
-/** As much as a surface may reflect: with 1 in a closed room light would never end. */
-const most = (reflectance: number[]) => reflectance.map((r) => Math.min(0.99, r));
+/** The most that a surface may reflect: with 1 in a closed room light would never end. */
+const MOST = 0.99;
+
+/** A reflectance, or as much of its colour as there may be. */
+const most = (reflectance: number[]) => {
+  const peak = Math.max(...reflectance);
+  return peak > MOST ? reflectance.map((r) => (r * MOST) / peak) : reflectance;
+};
 
 /** Ways over the size of the scene that are not asked for: long before, what is moved would be too far from its middle. */
 const FAR = 10;

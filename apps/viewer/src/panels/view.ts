@@ -28,7 +28,11 @@ export function unitOf(layer: Layer): string {
 const BOUNCES = 6;
 
 export function viewPanel(app: App): HTMLElement {
-  const look = choice('Colours', [['eye', 'As seen', 'F2'], ['lux', 'Lux', 'F2']], (value) => app.showFalseColours(value === 'lux'));
+  const look = choice('Colours', [['eye', 'As seen', 'F2'], ['lux', 'Lux', 'F2']], (value) => {
+    // Noise has false colours alone.
+    if (value === 'eye' && isError(app.layer)) app.showLayer('total');
+    app.showFalseColours(value === 'lux');
+  });
   look.id = 'colours';
   const exposure = slider('Exposure', { min: -16, max: 8, step: 0.1, unit: 'EV' }, (value) => {
     app.forgive();
@@ -80,7 +84,7 @@ export function viewPanel(app: App): HTMLElement {
     names = now;
   });
   app.on('view', () => {
-    look.set(app.falseColours ? 'lux' : 'eye');
+    look.set(app.falseColours || isError(app.layer) ? 'lux' : 'eye');
     exposure.set(app.exposure.value);
     curve.value = app.curve;
     automatic.set(app.exposure.isAutomatic);

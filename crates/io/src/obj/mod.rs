@@ -327,12 +327,14 @@ impl<'a> Faces<'a> {
         if let Some(current) = self.current {
             return current;
         }
+        let material = self.material.unwrap_or_else(|| library.grey());
         let name = match (self.object.as_str(), self.group.as_str()) {
+            // Where nothing has a name of its own, each material is an object.
+            ("", "") if self.material.is_some() => library.materials[material].name.clone(),
             ("", "") => "object".to_owned(),
             (name, "") | ("", name) => name.to_owned(),
             (object, group) => format!("{object} {group}"),
         };
-        let material = self.material.unwrap_or_else(|| library.grey());
         let (parts, vertex_of) = (&mut self.parts, &mut self.vertex_of);
         let index = *self.part_of.entry((name.clone(), material)).or_insert_with(|| {
             parts.push(Part { name, material, ..Part::default() });

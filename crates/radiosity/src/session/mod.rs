@@ -129,14 +129,14 @@ pub struct Status {
     pub most_rays: u32,
     /// Share of all rays of elements that are traced, those that are not shown yet and those that an edit has dirtied among them.
     pub share: f64,
-    /// Share of the places at which edges within elements are looked for that has been looked at, about.
+    /// Share of the places at which edges within elements are looked for that has been looked at, about; none before all else is done.
     pub sharpened: f64,
     /// One standard error of the irradiance by the rays of rows, relative, in the area-weighted mean square; that of shadow
     /// rays and of the elements' size are not in it. Infinite while dark, and after an edit until it is known of its light.
     pub error: f64,
     /// Relative residual of what is shown.
     pub residual: f64,
-    /// Rays traced so far.
+    /// Rays traced so far, but for those that look for edges within elements, and for what is measured.
     pub rays_traced: u64,
     /// Seconds of work so far.
     pub seconds: f64,

@@ -171,8 +171,8 @@ impl Bounds {
     pub fn may_meet(&self, origin: DVec3, direction: DVec3, length: f64, margin: f64) -> bool {
         let inverse = 1.0 / direction;
         let (a, b) = ((self.low - margin - origin) * inverse, (self.high + margin - origin) * inverse);
-        // Where a direction is zero and a face goes through the origin, 0 · ∞ is no number, and `min` and `max` take the other one: that
-        // is within the margin of the box.
+        // Where a direction is zero and a face goes through the origin, 0 · ∞ is no number and cuts nothing off: that is within the
+        // margin of the box.
         let (near, far) = (a.min(b), a.max(b));
         let enter = near.x.max(near.y).max(near.z).max(0.0);
         let leave = far.x.min(far.y).min(far.z).min(length + margin);

@@ -214,8 +214,8 @@ impl World {
         self.apart.clear();
     }
 
-    /// How far outside its box a ray may meet an object: corners may be off by 2^-21 of the distance to the far side of the scene,
-    /// which is eight half extents at the most.
+    /// How far outside its box a ray may meet an object: each coordinate of a corner may be off by 2^-21 of the distance to the far side
+    /// of the scene, which is eight half extents at the most; all three together by less than twice as much.
     pub fn margin(&self) -> f64 {
         8.0 * self.offset
     }
