@@ -3,39 +3,66 @@ import { DataUtils } from 'three';
 import type { Batches } from './batch';
 import { unbordered } from './border';
 import { Surface } from './surface';
-import type { CutsFrame, MeshFrame } from './wire';
+import { crossed, isLit, row } from './lattice';
+import type { CutElement, CutsFrame, MeshFrame } from './wire';
 
-/** Where a row of places begins. */
-const row = (parts: number, j: number) => j * (parts + 1) - (j * (j - 1)) / 2;
-
-const count = (parts: number) => row(parts, parts + 1);
-
-/** An element that is cut into so many parts along each side. */
-class Cutting {
-  /** Weights of the corners at the places, row by row as the server counts them. */
-  readonly weights: number[][] = [];
+/** The places of an element that is cut, and its parts. */
+interface Cutting {
+  /** Weights of the corners at the places, row by row as the server counts them; after these two for each crossing of an edge, on the side
+   *  of its line's first place and on the other. */
+  weights: number[][];
   /** The parts as triples of places. */
-  readonly triangles: number[] = [];
-
-  constructor(parts: number) {
-    for (let j = 0; j <= parts; j += 1) {
-      for (let i = 0; i <= parts - j; i += 1) {
-        this.weights.push([1 - (i + j) / parts, i / parts, j / parts]);
-        const [here, above] = [row(parts, j) + i, row(parts, j + 1) + i];
-        if (i + j < parts) this.triangles.push(here, here + 1, above);
-        if (i + j < parts - 1) this.triangles.push(here + 1, above + 1, above);
-      }
-    }
-  }
+  triangles: number[];
 }
 
-const cuttings = new Map<number, Cutting>();
+function cutting({ parts, edge }: CutElement): Cutting {
+  const weights: number[][] = [];
+  for (let j = 0; j <= parts; j += 1) {
+    for (let i = 0; i <= parts - j; i += 1) weights.push([1 - (i + j) / parts, i / parts, j / parts]);
+  }
+  const whole: number[] = [];
+  for (let j = 0; j < parts; j += 1) {
+    for (let i = 0; i < parts - j; i += 1) {
+      const [here, above] = [row(parts, j) + i, row(parts, j + 1) + i];
+      whole.push(here, here + 1, above);
+      if (i + j < parts - 1) whole.push(here + 1, above + 1, above);
+    }
+  }
+  if (!edge) return { weights, triangles: whole };
+  const size = weights.length;
+  const crossings = new Map<number, number>();
+  crossed(parts, edge.isLit).forEach(([a, b], m) => {
+    const share = edge.shares[m] / 65535;
+    const place = weights[a].map((weight, k) => weight + share * (weights[b][k] - weight));
+    crossings.set(a * size + b, weights.length);
+    weights.push(place, place);
+  });
+  /** The place on a line to another place where it meets the edge, on its own side. */
+  const near = (from: number, to: number) => crossings.get(Math.min(from, to) * size + Math.max(from, to))! + (from > to ? 1 : 0);
+  const triangles: number[] = [];
+  for (let k = 0; k < whole.length; k += 3) {
+    const corners = whole.slice(k, k + 3);
+    const lit = corners.map((place) => isLit(edge.isLit, place));
+    // Of three places one is unlike the others.
+    const odd = [0, 1, 2].find((k) => lit[k] !== lit[(k + 1) % 3] && lit[k] !== lit[(k + 2) % 3]);
+    if (odd === undefined) triangles.push(...corners);
+    else {
+      const [a, b, c] = [0, 1, 2].map((k) => corners[(odd + k) % 3]);
+      triangles.push(a, near(a, b), near(a, c), near(b, a), b, c, near(b, a), c, near(c, a));
+    }
+  }
+  return { weights, triangles };
+}
 
-function cutting(parts: number): Cutting {
-  let found = cuttings.get(parts);
+/** Those of elements without an edge, which are many alike. */
+const plain = new Map<number, Cutting>();
+
+function cuttingOf(cut: CutElement): Cutting {
+  if (cut.edge) return cutting(cut);
+  let found = plain.get(cut.parts);
   if (!found) {
-    found = new Cutting(parts);
-    cuttings.set(parts, found);
+    found = cutting(cut);
+    plain.set(cut.parts, found);
   }
   return found;
 }
@@ -47,16 +74,17 @@ class CutElements extends Surface {
   constructor(whole: Surface, frame: CutsFrame) {
     const { position, uv, paint } = whole.geometry.attributes;
     const index = whole.geometry.index!;
-    const places = frame.cuts.reduce((sum, [, parts]) => sum + count(parts), 0);
+    const cuttings = frame.cuts.map(cuttingOf);
+    const places = cuttings.reduce((sum, { weights }) => sum + weights.length, 0);
     const of = (from: ArrayLike<number>, size: number) => ({ from, size, to: new Float32Array(size * places) });
     const light = Float32Array.from(whole.light.array, (half) => DataUtils.fromHalfFloat(half));
     const values = [...[position, uv, paint].map(({ array, itemSize }) => of(array, itemSize)), of(light, 3)];
-    const indices = new Uint32Array(frame.cuts.reduce((sum, [, parts]) => sum + 3 * parts * parts, 0));
-    const firsts = new Map<number, [number, number]>();
+    const indices = new Uint32Array(cuttings.reduce((sum, { triangles }) => sum + triangles.length, 0));
+    const firsts = new Map<number, [number, Cutting]>();
     let [first, corner] = [0, 0];
-    for (const [element, parts] of frame.cuts) {
-      firsts.set(element, [first, parts]);
-      const { weights, triangles } = cutting(parts);
+    for (const [k, { weights, triangles }] of cuttings.entries()) {
+      const { element } = frame.cuts[k];
+      firsts.set(element, [first, cuttings[k]]);
       const corners = [0, 1, 2].map((k) => index.getX(3 * element + k));
       weights.forEach((weight, place) => {
         for (const { from, size, to } of values) {
@@ -83,22 +111,31 @@ class CutElements extends Surface {
     this.visible = whole.visible;
   }
 
-  /** The first place of each element, and its parts. */
-  private readonly firsts: Map<number, [number, number]>;
+  /** The first place of each element, and how it is cut. */
+  private readonly firsts: Map<number, [number, Cutting]>;
 
   override around(element: number, [v, w]: [number, number]): [number, number][] | null {
     const own = this.firsts.get(element);
     if (own === undefined) return null;
-    const [first, parts] = own;
-    const [x, y] = [v, w].map((weight) => Math.min(1, Math.max(0, weight)) * parts);
-    const j = Math.min(Math.floor(y), parts - 1);
-    const i = Math.min(Math.floor(x), parts - 1 - j);
-    const at = (i: number, j: number) => first + row(parts, j) + i;
-    const [a, b] = [x - i, y - j];
-    // Of the two halves of a cell the upper is not there at the slanting side.
-    const isLower = a + b <= 1 || i + j + 2 > parts;
-    const third: [number, number] = isLower ? [at(i, j), 1 - a - b] : [at(i + 1, j + 1), a + b - 1];
-    return [third, [at(i + 1, j), isLower ? a : 1 - b], [at(i, j + 1), isLower ? b : 1 - a]];
+    const [first, { weights, triangles }] = own;
+    type Place = readonly [number, number];
+    const across = (a: Place, b: Place, c: Place) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    const at: Place = [v, w];
+    let [most, found]: [number, [number, number][]] = [-Infinity, []];
+    // The part that has it most within.
+    for (let k = 0; k < triangles.length; k += 3) {
+      const places = triangles.slice(k, k + 3);
+      const [a, b, c] = places.map((place) => [weights[place][1], weights[place][2]] as const);
+      const area = across(a, b, c);
+      if (area <= 0) continue;
+      const shares = [across(at, b, c) / area, across(a, at, c) / area, across(a, b, at) / area];
+      const least = Math.min(...shares);
+      if (least <= most) continue;
+      most = least;
+      const whole = shares.reduce((sum, share) => sum + Math.max(0, share), 0);
+      found = places.map((place, i) => [first + place, Math.max(0, shares[i]) / whole]);
+    }
+    return found;
   }
 }
 

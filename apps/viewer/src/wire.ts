@@ -1,4 +1,5 @@
 // What page and server say to each other. JSON in both directions; triangles and light come as binary frames.
+import { crossed } from './lattice';
 
 /** The scene as a whole. */
 export interface SceneNotice {
@@ -260,12 +261,28 @@ export interface MeshFrame {
   indices: Uint32Array;
 }
 
-/** Which elements of an object are cut, as light has an edge in them, and into how many parts along each side. */
+/** An element that is cut, as light has an edge in it, into so many parts along each side. */
+export interface CutElement {
+  element: number;
+  parts: number;
+  /** The edge of a shadow, if a sharp one goes through it. */
+  edge: Edge | null;
+}
+
+/** The edge of a shadow among the places of an element. */
+export interface Edge {
+  /** Whether places see the lamp, a bit each, row by row. */
+  isLit: Uint32Array;
+  /** Where the edge crosses lines, over 65535 of the way: of each place in turn those to the next one of its row, the one above, and the one before that. */
+  shares: Uint16Array;
+}
+
+/** Which elements of an object are cut. */
 export interface CutsFrame {
   object: number;
   /** Their light begins with it. */
   number: number;
-  cuts: [number, number][];
+  cuts: CutElement[];
 }
 
 /** Light of some vertices, three half floats each in units of 16 lx; after the vertices follow the number of the
@@ -279,6 +296,7 @@ export interface LightFrame {
 const MESH = 1;
 const LIGHT = 2;
 const CUTS = 3;
+const HAS_EDGE = 1 << 31;
 const HAS_UVS = 1;
 const HAS_COLOURS = 2;
 
@@ -297,8 +315,24 @@ function readMesh(buffer: ArrayBuffer): MeshFrame {
 }
 
 function readCuts(buffer: ArrayBuffer): CutsFrame {
-  const [, object, number, ...words] = new Uint32Array(buffer);
-  return { object, number, cuts: Array.from({ length: words.length / 2 }, (_, k) => [words[2 * k], words[2 * k + 1]]) };
+  const [, object, number] = new Uint32Array(buffer, 0, 3);
+  const words = new Uint32Array(buffer, 12);
+  const cuts: CutElement[] = [];
+  for (let at = 0; at < words.length;) {
+    const [element, parts] = [words[at], words[at + 1] & ~HAS_EDGE];
+    const hasEdge = parts !== words[at + 1];
+    at += 2;
+    const cut: CutElement = { element, parts, edge: null };
+    if (hasEdge) {
+      const isLit = words.subarray(at, at + Math.ceil(((parts + 1) * (parts + 2)) / 64));
+      at += isLit.length;
+      const count = crossed(parts, isLit).length;
+      cut.edge = { isLit, shares: new Uint16Array(buffer, 12 + 4 * at, count) };
+      at += Math.ceil(count / 2);
+    }
+    cuts.push(cut);
+  }
+  return { object, number, cuts };
 }
 
 function* readLight(buffer: ArrayBuffer): Generator<LightFrame> {

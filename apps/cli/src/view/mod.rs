@@ -70,11 +70,11 @@ pub struct Arguments {
 const WAITING: usize = 256;
 
 /// Most places at which light is found where it has an edge within elements: pages draw up to two triangles for each, and six bytes
-/// come with every change of it. A furnished room in the sun with a garden takes 170,000, an office 195,000.
-const PLACES: usize = 200_000;
+/// come with every change of it. A furnished room in the sun with a garden takes 215,000, an office 195,000.
+const PLACES: usize = 300_000;
 
 /// How many there may be for each element where many of these are asked for: finer ones have finer parts.
-const PLACES_OF_ONE: usize = 3;
+const PLACES_OF_ONE: usize = 4;
 
 /// How long open connections have to end.
 const FAREWELL: Duration = Duration::from_millis(500);

@@ -5,7 +5,7 @@ mod telling;
 use super::board::Board;
 use super::history::{self, Gesture, History, targets};
 use super::wire::{CameraPlace, Refused, Request, Say};
-use radiosity::session::{Edit, EditError, Layer, Model, ObjectId, Plane, Session, SurfacePlace, Survey};
+use radiosity::session::{CutElement, Edit, EditError, Layer, Model, ObjectId, Plane, Session, SurfacePlace, Survey};
 use radiosity::{Bands, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -64,7 +64,7 @@ pub struct Solver {
     /// was told last.
     back: BTreeSet<ObjectId>,
     /// How objects were cut last that were so once, and how often that has changed.
-    cut: BTreeMap<ObjectId, (u32, Vec<(u32, u32)>)>,
+    cut: BTreeMap<ObjectId, (u32, Vec<CutElement>)>,
     /// Who wants all there is, when the last edit is seen.
     exports: Vec<oneshot::Sender<Export>>,
     /// Layers that pages look at.
@@ -558,7 +558,7 @@ fn not_kept(why: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::board::{Notice, Seen};
-    use super::super::wire::CUTS;
+    use super::super::wire::{CUTS, cuts as cuts_frame};
     use super::*;
     use radiosity::session::{PlaneQuestion, SessionOptions};
 
@@ -656,7 +656,7 @@ mod tests {
         let words = |bytes: &[u8]| -> Vec<u32> {
             bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
         };
-        let mut most = 0;
+        let (mut most, mut edges) = (0, 0);
         for shift in [0.0, 0.05] {
             let block = solver.model.objects.iter().find(|object| object.name.contains("block")).unwrap().id;
             let matrix = glam::DMat4::from_translation(glam::DVec3::X * shift).to_cols_array();
@@ -691,7 +691,10 @@ mod tests {
                         })
                         .collect();
                     let vertices = solver.model.objects[object as usize].positions.len() as u32;
-                    let places: u32 = cuts[3..].chunks(2).map(|cut| (cut[1] + 1) * (cut[1] + 2) / 2).sum();
+                    let own = solver.session.cuts(ObjectId(object));
+                    let places: u32 = own.iter().map(|cut| cut.places().len() as u32).sum();
+                    edges += own.iter().filter(|cut| cut.edge.is_some()).count();
+                    assert_eq!(words(&cuts_frame(ObjectId(object), number, &own)), *cuts);
                     let whole = if places > 0 { vertices + 1 + places } else { vertices };
                     assert_eq!(values.len() as u32, 3 * whole, "{layer:?} of object {object}");
                     if places > 0 {
@@ -700,7 +703,7 @@ mod tests {
                 }
             }
         }
-        assert!(most > 1, "what was cut has changed");
+        assert!(most > 1 && edges > 0, "what was cut has changed, and there are edges: {most} {edges}");
     }
 
     /// A page that has not read other answers gets its plane when it has; meanwhile other pages get theirs.

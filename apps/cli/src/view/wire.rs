@@ -12,7 +12,9 @@ use super::board::{CHUNK, LightChunk};
 use axum::body::Bytes;
 use glam::{DVec2, DVec3};
 use half::f16;
-use radiosity::session::{Edit, Form, Layer, LightId, ModelLight, ModelObject, ObjectId, PlaneFigures, PlaneQuestion};
+use radiosity::session::{
+    CutElement, Edit, Form, Layer, LightId, ModelLight, ModelObject, ObjectId, PlaneFigures, PlaneQuestion,
+};
 use radiosity::{Bands, Scene, Surface, Texture, TextureRef, Wrap};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
@@ -446,9 +448,23 @@ pub fn mesh(object: &ModelObject, scene: &Scene) -> Bytes {
     words.chain(floats).chain(object.indices.iter().copied()).flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
 }
 
-/// The elements of an object that are cut, each with its parts along each side, and the number that their light has.
-pub fn cuts(object: ObjectId, number: u32, cuts: &[(u32, u32)]) -> Bytes {
-    let words = [CUTS, object.0, number].into_iter().chain(cuts.iter().flat_map(|(element, parts)| [*element, *parts]));
+/// Beside the parts of an element whose edge follows.
+const HAS_EDGE: u32 = 1 << 31;
+
+/// The elements of an object that are cut, each with its parts along each side and, where an edge goes through it, which places see the lamp,
+/// 32 in a word, and where lines cross the edge, as 16 bits two in a word; and the number that their light has.
+pub fn cuts(object: ObjectId, number: u32, cuts: &[CutElement]) -> Bytes {
+    let of = |cut: &CutElement| {
+        let mut words = vec![cut.element, cut.parts | if cut.edge.is_some() { HAS_EDGE } else { 0 }];
+        if let Some(edge) = &cut.edge {
+            let bits = |is_lit: &[bool]| (0..).zip(is_lit).fold(0, |bits, (k, is_lit)| bits | u32::from(*is_lit) << k);
+            words.extend(edge.is_lit.chunks(32).map(bits));
+            let sixteen = |share: &f32| (65535.0 * share.clamp(0.0, 1.0)).round() as u32;
+            words.extend(edge.shares.chunks(2).map(|pair| sixteen(&pair[0]) | pair.get(1).map_or(0, sixteen) << 16));
+        }
+        words
+    };
+    let words = [CUTS, object.0, number].into_iter().chain(cuts.iter().flat_map(of));
     words.flat_map(u32::to_le_bytes).collect::<Vec<u8>>().into()
 }
 

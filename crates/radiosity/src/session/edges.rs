@@ -6,6 +6,9 @@
 //! (Cohen, Greenberg, Immel and Brock 1986, "An efficient radiosity approach for realistic image synthesis"): what surfaces give off
 //! is that of whole elements still.
 //!
+//! Of the sun and of lamps without area each place sees all or nothing, and parts are split along the edge (`split`), of the lamp that makes
+//! the greatest difference where there are several.
+//!
 //! Shadow rays to a lamp with area go to the same spots of it from all places that are not next to it, so that neighbours differ by what stands in between and by
 //! no noise: the same number of other spots from each place made walls mottled. Its shadows are softer, and elements have fewer places.
 //!
@@ -19,11 +22,13 @@
 //! until all are looked for again: an edge within that moved, and changed nothing at the corners, is where it was till then.
 
 use super::lattice::{between, corners, is_even, places, places_of};
+use super::split::{CutElement, Edge, find_edge};
 use super::{Layer, ObjectId, Session, Strand};
 use glam::{DMat3, DMat4};
 use radiosity_scene::{Bands, luminance};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Fewest spots of a lamp with area that some place of a lit element sees, by which it is cut: of lamps in many rooms that are one object
@@ -129,9 +134,16 @@ struct Found {
     more: Vec<Bands>,
     /// How much less of that counts, evenly between the corners.
     less: [Bands; 3],
+    /// A sharp edge, if there is one, and by how much its places have more.
+    edge: Option<(Arc<Edge>, Vec<Bands>)>,
 }
 
 impl Found {
+    /// The same of other places.
+    fn with(&self, more: Vec<Bands>) -> Found {
+        Found { corners: self.corners, more, less: self.less, edge: None }
+    }
+
     /// By how much a place has more than is shown, as far as it counts: no place gets less than nothing of the lamp.
     fn counted(&self, uv: [f32; 2], more: Bands) -> Bands {
         if self.less == [[0.0; 3]; 3] {
@@ -144,8 +156,38 @@ impl Found {
 
 /// An element that is cut.
 struct Cut {
-    parts: u32,
+    own: CutElement,
+    places: Vec<[f32; 2]>,
     strands: Vec<(usize, Found)>,
+}
+
+impl Cut {
+    /// Where light runs evenly, so that the corners tell all.
+    fn whole(element: u32, looked: u32, found: &[(usize, &Found)]) -> Cut {
+        let of = |(strand, found): &(usize, &Found)| (*strand, found.with(corners(looked, &found.more).to_vec()));
+        let own = CutElement { element, parts: 1, edge: None };
+        Cut { places: own.places(), own, strands: found.iter().map(of).collect() }
+    }
+
+    /// Where light has an edge: parts are split along that of the lamp that makes the greatest difference, if it is a sharp one.
+    fn with_edge(element: u32, parts: u32, found: &[(usize, &Found)]) -> Cut {
+        let height = |more: &[Bands]| {
+            let light = more.iter().map(|more| luminance(*more));
+            let [low, high] =
+                light.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+            high - low
+        };
+        let sharp = found.iter().filter_map(|(strand, found)| found.edge.as_ref().map(|edge| (*strand, edge)));
+        let first = sharp.max_by(|(_, a), (_, b)| height(&a.1).total_cmp(&height(&b.1)));
+        let own = CutElement { element, parts, edge: first.map(|(_, (edge, _))| edge.clone()) };
+        let places = own.places();
+        let of = |(strand, found): &(usize, &Found)| match first {
+            Some((first, (_, more))) if first == *strand => (*strand, found.with(more.clone())),
+            _ => (*strand, found.with(places.iter().map(|uv| between(parts, &found.more, *uv)).collect())),
+        };
+        let strands = found.iter().map(of).collect();
+        Cut { own, places, strands }
+    }
 }
 
 /// What is known of edges.
@@ -168,8 +210,8 @@ fn in_all(samples: &[Sample]) -> usize {
 
 /// Bytes that so many places take, with what is looked at to find them.
 pub fn bytes(places: usize) -> usize {
-    // Looked at coarsely and finely, in use, and in use before.
-    (3 * LOOKED_AT + 2) * places * size_of::<Bands>()
+    // Looked at coarsely and finely, with edges, in use, and in use before.
+    (4 * LOOKED_AT + 2) * places * size_of::<Bands>()
 }
 
 impl Wanted {
@@ -212,17 +254,20 @@ impl Edges {
         let mut count = 0;
         for one in wanted {
             let has_edge = self.has_edge(one);
-            let (from, parts) = if has_edge { (one.cut(), one.parts) } else { (one.probe(), 1) };
-            count += places_of(parts);
+            let from = if has_edge { one.cut() } else { one.probe() };
+            let found = |(strand, _): &(usize, f32)| Some((*strand, self.samples.get(&(one.key, *strand, from))?));
+            let found: Vec<(usize, &Found)> = one.strands.iter().filter_map(found).collect();
+            let element = one.key.1;
+            let cut = if has_edge {
+                Cut::with_edge(element, one.parts, &found)
+            } else {
+                Cut::whole(element, from.looked, &found)
+            };
+            count += cut.places.len();
             if count > most {
                 break;
             }
-            let of = |(strand, _): &(usize, f32)| {
-                let found = self.samples.get(&(one.key, *strand, from))?;
-                let more = if has_edge { found.more.clone() } else { corners(from.looked, &found.more).to_vec() };
-                Some((*strand, Found { more, ..*found }))
-            };
-            cuts.insert(one.key, Cut { parts, strands: one.strands.iter().filter_map(of).collect() });
+            cuts.insert(one.key, cut);
         }
         cuts
     }
@@ -275,7 +320,7 @@ impl Session {
                         || is_buried(element)
                         || self.is_left_out(*strand, (*object, element))
                 };
-                let (spots, more) = (display.spots(*element), corners(own.parts, &found.more));
+                let (spots, more) = (display.spots(*element), corners(own.own.parts, &found.more));
                 found.less = [0, 1, 2].map(|k| {
                     let share = 1.0 - display.share(spots[k], &is_done);
                     more[k].map(|x| share * x)
@@ -285,8 +330,8 @@ impl Session {
     }
 
     /// The elements of an object that are cut.
-    fn cuts_of(&self, object: usize) -> impl Iterator<Item = (u32, &Cut)> {
-        self.edges.cuts.range((object, 0)..(object + 1, 0)).map(|((_, element), cut)| (*element, cut))
+    fn cuts_of(&self, object: usize) -> impl Iterator<Item = &Cut> {
+        self.edges.cuts.range((object, 0)..(object + 1, 0)).map(|(_, cut)| cut)
     }
 
     /// Share of the places to be looked at that has been.
@@ -438,7 +483,8 @@ impl Session {
     fn sample(&self, (key, strand, parts): Sample) -> Found {
         let places = || places(parts.looked);
         let corners = self.corners(key, strand);
-        let as_shown = || Found { corners, more: vec![[0.0; 3]; places().count()], less: [[0.0; 3]; 3] };
+        let nothing = [[0.0; 3]; 3];
+        let as_shown = || Found { corners, more: vec![nothing[0]; places().count()], less: nothing, edge: None };
         let Some(column) = self.strands[strand].column else { return as_shown() };
         let world = self.live.world();
         let (body, display) = (&world.bodies[key.0], self.display(key.0));
@@ -469,22 +515,40 @@ impl Session {
             let shown = between(1, &corners, [v, w]);
             (std::array::from_fn(|band| found[band] - shown[band]), seen)
         };
-        let (more, seen): (Vec<Bands>, Vec<usize>) = places().map(more).unzip();
+        let (mut more, seen): (Vec<Bands>, Vec<usize>) = places().map(more).unzip();
         let is_lit = luminance(self.of_column(key.0, strand)(key.1).0) > 0.0;
         if is_lit && !self.is_certain(strand) && seen.into_iter().all(|seen| seen < LEAST_SEEN) {
             return as_shown();
         }
-        Found { corners, more, less: [[0.0; 3]; 3] }
+        if parts.looked != parts.cut || !self.is_certain(strand) {
+            return Found { corners, more, less: nothing, edge: None };
+        }
+        let found = |uv: [f32; 2]| self.live.receive_around(column, &[facing(uv)], &spots).0;
+        let alone = |uv: [f32; 2]| {
+            let (found, shown) = (found(uv), between(1, &corners, uv));
+            std::array::from_fn(|band| found[band] - shown[band])
+        };
+        let edge = find_edge(parts.cut, |uv| luminance(found(uv)) > 0.0);
+        if edge.is_none() {
+            // That of a neighbour along a side is none of this one.
+            let is_on_side = |[v, w]: [f32; 2]| v == 0.0 || w == 0.0 || v + w > 1.0 - 0.5 / parts.cut as f32;
+            more.iter_mut().zip(places()).filter(|(_, uv)| is_on_side(*uv)).for_each(|(more, uv)| *more = alone(uv));
+        }
+        let edge = edge.map(|edge| {
+            let values = edge.values(parts.cut, alone);
+            (Arc::new(edge), values)
+        });
+        Found { corners, more, less: nothing, edge }
     }
 
-    /// Elements of an object that are cut for display where light has an edge, and into how many parts along each side. None for an
-    /// object that there is not, and before the light is there.
-    pub fn cuts(&self, object: ObjectId) -> Vec<(u32, u32)> {
-        self.cuts_of(object.0 as usize).map(|(element, cut)| (element, cut.parts)).collect()
+    /// Elements of an object that are cut for display where light has an edge. None for an object that there is not, and before the
+    /// light is there.
+    pub fn cuts(&self, object: ObjectId) -> Vec<CutElement> {
+        self.cuts_of(object.0 as usize).map(|cut| cut.own.clone()).collect()
     }
 
     /// The light of a layer at the places of the elements that are cut ([`Session::cuts`]), given that at the vertices
-    /// ([`Session::light`]), in lux per band as that: with n parts, corner 1 counts i/n and corner 2 j/n, j from 0 to n and for each i from 0 to n − j.
+    /// ([`Session::light`]), in lux per band as that, in the order of [`CutElement::places`].
     pub fn light_of_cuts(&self, object: ObjectId, layer: Layer, light: &[Bands]) -> Vec<Bands> {
         let own = match layer {
             Layer::Light(light) => self.light_of(light).map(|light| light.strand),
@@ -496,13 +560,13 @@ impl Session {
             Layer::Indirect | Layer::Bounce(_) | Layer::Error | Layer::RelativeError => false,
         };
         let mut all: Vec<Bands> = Vec::new();
-        for (element, cut) in self.cuts_of(object.0 as usize) {
+        for cut in self.cuts_of(object.0 as usize) {
             let (first, display) = (all.len(), self.display(object.0 as usize));
-            all.extend(places(cut.parts).map(|uv| display.at(light, element, uv)));
+            all.extend(cut.places.iter().map(|uv| display.at(light, cut.own.element, *uv)));
             for (strand, found) in cut.strands.iter().filter(|(strand, _)| is_in(*strand)) {
                 let factor = self.state.factors.get(*strand).copied().unwrap_or_default();
-                for ((light, more), uv) in all[first..].iter_mut().zip(&found.more).zip(places(cut.parts)) {
-                    let more = found.counted(uv, *more);
+                for ((light, more), uv) in all[first..].iter_mut().zip(&found.more).zip(&cut.places) {
+                    let more = found.counted(*uv, *more);
                     (0..3).for_each(|band| light[band] += factor[band] * more[band]);
                 }
             }
@@ -517,7 +581,7 @@ impl Session {
         if let Some(cut) = self.edges.cuts.get(&(object, element)) {
             for (strand, found) in &cut.strands {
                 let factor = self.state.factors.get(*strand).copied().unwrap_or_default();
-                let more = found.counted(uv, between(cut.parts, &found.more, uv));
+                let more = found.counted(uv, cut.own.between(&found.more, uv));
                 (0..3).for_each(|band| shown[band] += factor[band] * more[band]);
             }
         }

@@ -12,10 +12,15 @@ pub fn places(parts: u32) -> impl Iterator<Item = [f32; 2]> {
     (0..=parts).flat_map(move |j| (0..=parts - j).map(move |i| [i, j].map(|k| k as f32 / parts as f32)))
 }
 
+/// The place (i, j) among all, row by row.
+pub fn place(parts: u32, i: usize, j: usize) -> usize {
+    j * (parts as usize + 1) - j * j.saturating_sub(1) / 2 + i
+}
+
 /// What is at a place of an element between those that are known.
 pub fn between(parts: u32, known: &[Bands], [v, w]: [f32; 2]) -> Bands {
     let n = parts as usize;
-    let at = |i: usize, j: usize| known[j * (n + 1) - j * j.saturating_sub(1) / 2 + i];
+    let at = |i: usize, j: usize| known[place(parts, i, j)];
     let [x, y] = [v, w].map(|x| x.clamp(0.0, 1.0) * n as f32);
     let j = (y as usize).min(n - 1);
     let i = (x as usize).min(n - 1 - j);
@@ -32,7 +37,7 @@ pub fn between(parts: u32, known: &[Bands], [v, w]: [f32; 2]) -> Bands {
 
 /// What the corners of an element have.
 pub fn corners(parts: u32, known: &[Bands]) -> [Bands; 3] {
-    [known[0], known[parts as usize], known[known.len() - 1]]
+    [known[0], known[parts as usize], known[places_of(parts) - 1]]
 }
 
 /// Whether places have about what would run evenly between the corners.

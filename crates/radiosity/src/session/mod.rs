@@ -50,6 +50,7 @@ mod rectangle;
 mod saved;
 mod seams;
 mod solve;
+mod split;
 mod state;
 mod surroundings;
 mod survey;
@@ -59,6 +60,7 @@ pub use edit::{Applied, Edit, EditError, MOST_CONE, MOST_DIMMING, MOST_EDITS, MO
 pub use model::{Layer, LightId, LightKind, Model, ModelCamera, ModelLight, ModelObject, ObjectId, Probe};
 pub use plane::{Plane, PlaneError, PlaneFigures, PlanePoint, PlaneQuestion, PlaneReading};
 pub use probe::MOST_BOUNCES;
+pub use split::{CutElement, Edge};
 pub use survey::{Reading, SurfacePlace, Survey, Surveyed};
 
 use crate::Error;

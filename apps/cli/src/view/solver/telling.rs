@@ -4,7 +4,7 @@ use super::Solver;
 use crate::view::board::{Notice, Subject};
 use crate::view::wire::{self, CameraPlace, PlaneAnswer, ProbeAnswer, Say, Share};
 use radiosity::session::{
-    Layer, LightKind, ModelLight, ModelObject, ObjectId, PlaneError, PlaneReading, Probe, Reading, Surveyed,
+    CutElement, Layer, LightKind, ModelLight, ModelObject, ObjectId, PlaneError, PlaneReading, Probe, Reading, Surveyed,
 };
 use radiosity::{Bands, luminance};
 
@@ -64,7 +64,7 @@ impl Solver {
     }
 
     /// Which elements of an object are cut, and the light of a layer as it is sent: of its vertices, and of the places of these elements.
-    pub(super) fn light_of(&self, id: ObjectId, layer: Layer) -> (Vec<(u32, u32)>, [Vec<u16>; 2]) {
+    pub(super) fn light_of(&self, id: ObjectId, layer: Layer) -> (Vec<CutElement>, [Vec<u16>; 2]) {
         let light = self.session.light(id, layer);
         let of_cuts = if light.is_empty() { Vec::new() } else { self.session.light_of_cuts(id, layer, &light) };
         (self.session.cuts(id), [light, of_cuts].map(|light| wire::halves(&light)))
@@ -75,7 +75,7 @@ impl Solver {
     pub(super) fn post_cuts(
         &mut self,
         id: ObjectId,
-        cuts: Vec<(u32, u32)>,
+        cuts: Vec<CutElement>,
         [mut light, of_cuts]: [Vec<u16>; 2],
     ) -> Vec<u16> {
         let known = self.cut.get(&id);
