@@ -391,7 +391,7 @@ test('how long it will take is told while light comes', async () => {
     }
     return told;
   });
-  // To all rays first. Other programs may come and go meanwhile; without any the middle is 1.5.
+  // To all rays first. Other programs may come and go meanwhile; without any the middle is 1.3.
   const end = told.find(({ rays, most }) => rays === most)?.now;
   assert.ok(end, 'all rays are there before the end');
   const ratios = told.filter(({ left, now }) => left !== null && end - now > 400)

@@ -403,6 +403,13 @@ mod tests {
     }
 
     #[test]
+    fn without_names_objects_have_those_of_their_materials() {
+        let loaded = read(&format!("mtllib a b.mtl\n{QUAD}f 1 2 3\nusemtl red\nf 1 3 4\n"));
+        let names: Vec<&str> = loaded.scene.objects.iter().map(|object| object.name.as_str()).collect();
+        assert_eq!(names, ["object", "red"]);
+    }
+
+    #[test]
     fn units_and_vertex_colours_are_kept() {
         let options = LoadOptions { metres_per_unit: 0.001, ..LoadOptions::default() };
         let text = "v 0 0 0 1 0 0\nv 1000 0 0 0 1 0\nv 0 1000 0\nf 1 2 3\n";

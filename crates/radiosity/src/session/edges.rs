@@ -305,22 +305,22 @@ impl Session {
 
     /// At corners of elements that might be cut for the same lamp and are not nothing more counts.
     fn join(&self, cuts: &mut BTreeMap<Key, Cut>) {
-        let mut cut: BTreeMap<(usize, usize), Vec<u32>> = BTreeMap::new();
-        for ((object, element), own) in &*cuts {
-            for (strand, _) in &own.strands {
-                cut.entry((*object, *strand)).or_default().push(*element);
+        let mut done: BTreeMap<(usize, usize), Vec<u32>> = BTreeMap::new();
+        for ((object, element), cut) in &*cuts {
+            for (strand, _) in &cut.strands {
+                done.entry((*object, *strand)).or_default().push(*element);
             }
         }
-        cuts.par_iter_mut().for_each(|((object, element), own)| {
+        cuts.par_iter_mut().for_each(|((object, element), cut)| {
             let (display, is_buried) = (self.display(*object), self.buried(*object));
-            for (strand, found) in &mut own.strands {
-                let cut = &cut[&(*object, *strand)];
+            for (strand, found) in &mut cut.strands {
+                let done = &done[&(*object, *strand)];
                 let is_done = |element: u32| {
-                    cut.binary_search(&element).is_ok()
+                    done.binary_search(&element).is_ok()
                         || is_buried(element)
                         || self.is_left_out(*strand, (*object, element))
                 };
-                let (spots, more) = (display.spots(*element), corners(own.own.parts, &found.more));
+                let (spots, more) = (display.spots(*element), corners(cut.own.parts, &found.more));
                 found.less = [0, 1, 2].map(|k| {
                     let share = 1.0 - display.share(spots[k], &is_done);
                     more[k].map(|x| share * x)

@@ -5,7 +5,7 @@
 //! had teeth as wide as a part. (Discontinuity meshing, by what places see and not by geometry: Heckbert 1992, "Discontinuity
 //! meshing for radiosity"; Lischinski, Tampieri and Greenberg 1992.)
 
-use super::lattice::{place, places, places_of};
+use super::lattice::{between, place, places, places_of};
 use radiosity_scene::Bands;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -91,6 +91,9 @@ impl CutElement {
 
     /// What is at a place between its own.
     pub(super) fn between(&self, known: &[Bands], uv: [f32; 2]) -> Bands {
+        if self.edge.is_none() {
+            return between(self.parts, known, uv);
+        }
         let all = self.places();
         let across = |[a, b, c]: [[f32; 2]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         let within = |corners: [usize; 3]| {
