@@ -13,6 +13,8 @@ export class Adding {
   private awaited: number[][] = [];
   /** Which new lamp will be selected. */
   private awaitedLamp: ((light: LightNotice) => boolean) | null = null;
+  /** What is said when it comes. */
+  private told = '';
   /** Forms that were asked for last and have not come, how many times others were, and how many edits there will be then. */
   private wished = new Map<number, Shaped & { times: number; edits: number }>();
   /** What was added and selected last. */
@@ -33,7 +35,7 @@ export class Adding {
     this.pass(object);
     if (this.app.objects.has(object.id) || !this.awaited.some((matrix) => isPlace(object.matrix, matrix))) return;
     this.app.objects.set(object.id, object);
-    this.app.select(object.id);
+    this.choose(() => this.app.select(object.id));
   }
 
   private pass({ id, successor }: ObjectNotice): void {
@@ -46,6 +48,13 @@ export class Adding {
   /** Whether a light is the new one that was asked for. */
   isAwaited(light: LightNotice): boolean {
     return !this.app.lights.has(light.id) && (this.awaitedLamp?.(light) ?? false);
+  }
+
+  /** What was asked for has come: it is selected, which is said. */
+  choose(select: () => void): void {
+    const { told } = this;
+    select();
+    this.app.sayOfSelected(told);
   }
 
   /** What comes is not selected by itself. */
@@ -81,7 +90,7 @@ export class Adding {
     }
     const light = lampAhead(stage, navigator.scale, kind, this.newName('Lamp'));
     this.awaitedLamp = ({ name }) => name === light.name;
-    this.app.say(`Added: ${light.name}. It is selected.`);
+    this.told = `Added: ${light.name}. It is selected.`;
     this.app.edit({ add_light: { light } });
   }
 
@@ -93,7 +102,7 @@ export class Adding {
   /** Adds what belongs together. */
   private addObjects(objects: NewObject[]): void {
     this.awaited = objects.map(({ matrix }) => matrix);
-    this.app.say(`Added: ${objects[0].name}. It is selected.`);
+    this.told = `Added: ${objects[0].name}. It is selected.`;
     this.app.editAll(objects.map((object) => ({ add: { object } })));
   }
 
@@ -158,7 +167,7 @@ export class Adding {
     const motion = this.app.inScene(new Matrix4().makeTranslation(way));
     const copy = motion.multiply(new Matrix4().fromArray(matrix)).toArray();
     this.awaitedLamp = (light) => isLamp(light) && isPlace(light.matrix, copy);
-    this.app.say('Duplicated: the copy is selected.');
+    this.told = 'Duplicated: the copy is selected.';
     this.app.edit({ copy_light: { light: id, matrix: copy } });
   }
 
@@ -172,17 +181,17 @@ export class Adding {
     const way = right.multiplyScalar(0.6 * Math.max(size.x, size.z));
     const copies = this.app.placed(new Matrix4().makeTranslation(way)).map(([{ object }, matrix]) => ({ object, matrix: matrix.toArray() }));
     this.awaited = copies.map(({ matrix }) => matrix);
-    this.app.say('Duplicated: the copy is selected.');
+    this.told = 'Duplicated: the copy is selected.';
     this.app.editAll(copies.map((copy) => ({ copy })));
   }
 
   delete(): void {
     const lamp = this.lamp();
-    if (lamp) {
-      this.app.say(`Deleted: ${this.app.lightName(lamp)}. Undo brings it back.`);
-      this.app.edit({ delete_light: { light: lamp.id } });
-    }
-    this.app.editAll(this.app.group().map(({ object }): Edit => ({ delete: { object } })));
+    const group = this.app.group();
+    const name = lamp ? this.app.lightName(lamp) : group.length > 0 ? this.app.objects.get(group[0].object)!.name : '';
+    const edits: Edit[] = lamp ? [{ delete_light: { light: lamp.id } }] : group.map(({ object }) => ({ delete: { object } }));
+    // It is told until the next change, or until this one is undone.
+    if (this.app.editAll(edits)) this.app.say(`Deleted: ${name || 'it'}. Undo brings it back.`);
   }
 }
 

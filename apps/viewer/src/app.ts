@@ -64,6 +64,8 @@ export class App {
   /** A light without an object that is moved. */
   selectedLight: number | null = null;
   message = '';
+  /** Whether what is said still holds. */
+  private holds: () => boolean = () => true;
   private objectsAhead = new Ahead(this.objects, (object) => this.arrange(object.id));
   private lightsAhead = new Ahead(this.lights, (light) => this.shed(light));
   private listeners = new Map<Topic, (() => void)[]>();
@@ -76,9 +78,8 @@ export class App {
   private step: { field: Element | null; of: string; since: number } = { field: null, of: '', since: 0 };
   private pending: { gesture?: number; send: () => void; timer: number } | null = null;
   private lastSent = 0;
-  /** The gesture of the last edit, and what was refused since it began. */
+  /** The gesture of the last edit. */
   private editing: number | undefined;
-  private refusal = '';
   private messageTimer = 0;
   /** How lights were dimmed before all of them were turned off. */
   private levels = new Map<number, number>();
@@ -109,6 +110,7 @@ export class App {
 
   tell(topic: Topic): void {
     for (const listener of this.listeners.get(topic) ?? []) listener();
+    if (topic !== 'message' && !this.holds()) this.say(this.resting);
   }
 
   /** Tells with the next picture: hundreds of notices come together. */
@@ -123,25 +125,35 @@ export class App {
     topics.forEach((topic) => this.tell(topic));
   }
 
-  /** A line for the person, no longer than it takes to read: what it says may not hold for long. */
-  say(message: string): void {
+  /** A line for the person, no longer than it takes to read, and than it holds where that is known. */
+  say(message: string, holds: () => boolean = () => true): void {
     this.message = message;
+    this.holds = holds;
     clearTimeout(this.messageTimer);
     // What a layer waits for is said as long as it does.
     if (message && message !== this.resting) this.messageTimer = setTimeout(() => this.say(this.resting), READ);
     this.tell('message');
   }
 
-  /** Says why something is not as it was asked for, until something else is changed. */
-  refuse(message: string): void {
-    this.refusal = message;
-    this.say(message);
+  /** Says something about what is selected, as long as that is. */
+  sayOfSelected(message: string): void {
+    this.say(message, this.whileSelected());
   }
 
-  /** What was refused is told no longer. */
+  /** Whether what is selected now still is. */
+  private whileSelected(): () => boolean {
+    const { selected, selectedLight } = this;
+    return () => this.selected === selected && this.selectedLight === selectedLight;
+  }
+
+  /** Says why something is not as it was asked for, until something else is changed or selected. */
+  refuse(message: string): void {
+    this.say(message, this.whileSelected());
+  }
+
+  /** What was said of changes before this one is told no longer. */
   forgive(): void {
-    if (this.refusal && this.message === this.refusal) this.say('');
-    this.refusal = '';
+    if (this.message !== this.resting) this.say(this.resting);
   }
 
   // What the server says.
@@ -216,7 +228,6 @@ export class App {
         break;
       case 'refused':
         if (notice.code === 'layer') this.rest(notice.message);
-        else this.refusal = notice.message;
         this.say(notice.message);
         // A message that could not be read may have been a change.
         if (notice.code !== 'layer' && notice.code !== 'camera') this.takeBack();
@@ -299,7 +310,7 @@ export class App {
   private hearLight(light: LightNotice): void {
     const isAwaited = this.adding.isAwaited(light);
     this.lightsAhead.hear(light);
-    if (isAwaited) this.selectLight(light.id);
+    if (isAwaited) this.adding.choose(() => this.selectLight(light.id));
   }
 
   /** Light of the layer stays as it is, or follows again. */
@@ -342,6 +353,7 @@ export class App {
   private shine(frame: LightFrame): void {
     const surface = this.stage.surfaces.get(frame.object);
     if (surface) this.stage.shine(surface, frame.first, frame.values);
+    this.stage.begun();
     this.rest('');
     this.measuring.outdate();
     this.exposure.lit();
@@ -351,14 +363,16 @@ export class App {
   private refresh(): void {
     this.objectsAhead.expire();
     this.lightsAhead.expire();
+    // The camera moves without a word.
+    if (!this.holds()) this.say(this.resting);
     if (!this.isCaughtUp || !this.status) return;
     this.measuring.refresh(`${this.status.rays} ${this.status.edits} ${this.status.is_done} ${JSON.stringify(this.layer)}`);
   }
 
   // What a person does.
 
-  /** Changes the scene. Edits of one gesture, such as a drag, are sent at a steady pace and undone together. */
-  edit(edit: Edit, gesture?: number): void {
+  /** Changes the scene, unless the connection is lost. Edits of one gesture, such as a drag, are sent at a steady pace and undone together. */
+  edit(edit: Edit, gesture?: number): boolean {
     // Of a gesture that is refused each edit may be: told once, it stays.
     if (gesture === undefined || gesture !== this.editing) this.forgive();
     this.editing = gesture;
@@ -370,17 +384,19 @@ export class App {
     const send = () => {
       this.pending = null;
       this.lastSent = performance.now();
-      if (this.connection.send({ kind: 'edit', edit, gesture })) return;
+      if (this.connection.send({ kind: 'edit', edit, gesture })) return true;
       this.say('Not connected: the change was not made.');
       this.takeBack();
+      return false;
     };
-    if (wait > 0) this.pending = { gesture, send, timer: setTimeout(send, wait) };
-    else send();
+    if (wait <= 0) return send();
+    this.pending = { gesture, send, timer: setTimeout(send, wait) };
+    return true;
   }
 
   /** Changes together what belongs together. */
-  editAll(edits: Edit[], gesture?: number): void {
-    if (edits.length > 0) this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
+  editAll(edits: Edit[], gesture?: number): boolean {
+    return edits.length > 0 && this.edit(edits.length === 1 ? edits[0] : { several: edits }, gesture);
   }
 
   private drop(): void {
@@ -516,7 +532,7 @@ export class App {
   nudge(way: Vector3, angle: number, tilt: number, gesture: number): void {
     const spot = this.spot();
     if (!spot) {
-      if (this.selected !== null) this.say('It is part of the building and stays put, unless “Let it move” is pressed in the panel.');
+      if (this.selected !== null) this.sayOfSelected('It is part of the building and stays put, unless “Let it move” is pressed in the panel.');
       return;
     }
     const right = new Vector3(1, 0, 0).applyQuaternion(this.stage.camera.quaternion).setY(0).normalize();
@@ -619,7 +635,7 @@ export class App {
     const next = things[now < 0 ? (by > 0 ? 0 : things.length - 1) : (now + by + things.length) % things.length];
     if (next.object !== undefined) this.select(next.object);
     else this.selectLight(next.light!);
-    this.say(`Selected: ${next.name}.`);
+    this.sayOfSelected(`Selected: ${next.name}.`);
   }
 
   showEdges(is: boolean): void {
@@ -634,11 +650,11 @@ export class App {
     this.layer = layer;
     this.resting = '';
     // Light of the last layer would be taken for that of this one.
-    for (const surface of this.stage.surfaces.values()) this.stage.darken(surface);
+    this.stage.await();
     shared.emissionShown.value = layer === 'total' || layer === 'direct' ? 1 : 0;
     this.connection.look(layer);
     this.exposure.isBlind = isError(layer);
-    this.exposure.free();
+    this.exposure.show();
     this.paintMode();
   }
 
@@ -674,7 +690,11 @@ export class App {
     this.stage.look(place);
     this.navigator.choose();
     this.tell('view');
-    this.say(place.name ? `Camera “${place.name}”.` : '');
+    const { camera } = this.stage;
+    const [at, turned] = [camera.position.clone(), camera.quaternion.clone()];
+    // On foot one comes to stand on the floor.
+    const isThere = () => at.distanceTo(camera.position) < this.navigator.scale && turned.angleTo(camera.quaternion) < 0.1;
+    this.say(place.name ? `Camera “${place.name}”.` : '', isThere);
   }
 
   keepCamera(name: string): void {
@@ -691,7 +711,7 @@ export class App {
     const { canvas } = this.stage;
     canvas.focus();
     Promise.resolve(canvas.requestPointerLock())
-      .then(() => this.say('The mouse looks around; click measures what is under the cross, Esc ends.'))
+      .then(() => this.say('The mouse looks around; click measures what is under the cross, Esc ends.', () => document.pointerLockElement === canvas))
       .catch(() => this.say('The browser did not give the mouse away; drag to look around.'));
   }
 

@@ -32,6 +32,9 @@ export class Exposure {
   private isDue = false;
   private last = 0;
   private hasLight = false;
+  /** Another light than before is shown, and the meter has not seen it: how many times there was one. */
+  private isNew = false;
+  private shown = 0;
   /** What it was before the first change in this view; not higher until the camera moves. */
   private most: number | null = null;
   /** From where one looks. */
@@ -55,6 +58,13 @@ export class Exposure {
   meter(): void {
     this.isDue = true;
     this.last = 0;
+  }
+
+  /** Another light is shown from now on. */
+  show(): void {
+    this.isNew = true;
+    this.shown += 1;
+    this.free();
   }
 
   /** Looks again soon, as in a new view. */
@@ -111,19 +121,30 @@ export class Exposure {
       this.most = null;
       this.isDue = true;
     }
+    if (this.isNew && this.isDue) this.fit(this.stage.sampled());
     if (!this.isDue || now - this.last < EVERY) return;
     this.isDue = false;
     this.last = now;
     void this.look();
   }
 
+  /** Fits the scale to light that is seen, unless it was set. */
+  private fit(illuminance: number[]): void {
+    const range = this.isRangeAutomatic ? rangeOf(illuminance) : null;
+    if (!range || (range[0] === this.range[0] && range[1] === this.range[1])) return;
+    this.scale(range);
+    this.changed();
+  }
+
   private async look(): Promise<void> {
-    const { view } = this;
+    const { view, shown } = this;
     const seen = await this.stage.metering();
-    if (!seen) {
+    // What was shown before is of no use.
+    if (!seen || shown !== this.shown) {
       this.isDue = true;
       return;
     }
+    if (seen.illuminance.length > 0) this.isNew = false;
     this.seen = { picture: seen.picture, view };
     // In the dark eyes stay as they are.
     if (this.isAutomatic && !this.isBlind && seen.luminance.length > 0) {
@@ -138,10 +159,6 @@ export class Exposure {
         this.apply();
       }
     }
-    const range = this.isRangeAutomatic ? rangeOf(seen.illuminance) : null;
-    if (range && (range[0] !== this.range[0] || range[1] !== this.range[1])) {
-      this.scale(range);
-      this.changed();
-    }
+    this.fit(seen.illuminance);
   }
 }

@@ -158,7 +158,7 @@ export function listen(app: App, { help, fold }: { help: HTMLDialogElement; fold
     app.nudge(way, turn, tilt, gesture);
   };
   const tilt = (event: KeyboardEvent, by: number) => {
-    if (app.selectedLight === null && app.adding.parts().length === 0) app.say('Lamps without area can be tilted, and what was added: select one first.');
+    if (app.selectedLight === null && app.adding.parts().length === 0) app.sayOfSelected('Lamps without area can be tilted, and what was added: select one first.');
     else nudge(event, new Vector3(), 0, by);
   };
   const angle = (event: KeyboardEvent) => ((event.shiftKey ? 0.2 : 1) * TURN * Math.PI) / 180;
@@ -215,7 +215,7 @@ let camera = -1;
 
 function nextCamera(app: App): void {
   const all = [...(app.scene?.cameras ?? []), ...app.bookmarks];
-  if (all.length === 0) return app.say('There is no camera; B keeps this view as one.');
+  if (all.length === 0) return app.say('There is no camera; B keeps this view as one.', () => app.bookmarks.length === 0);
   camera = (camera + 1) % all.length;
   app.look(all[camera]);
 }
@@ -224,5 +224,6 @@ function nextLayer(app: App): void {
   const select = document.querySelector<HTMLSelectElement>('#layer')!;
   select.selectedIndex = (select.selectedIndex + 1) % select.options.length;
   app.showLayer(JSON.parse(select.value));
-  app.say(`Layer: ${select.selectedOptions[0].text}.`);
+  const { layer } = app;
+  app.say(`Layer: ${select.selectedOptions[0].text}.`, () => app.layer === layer);
 }

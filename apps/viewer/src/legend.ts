@@ -77,27 +77,38 @@ function drawScale(app: App, pen: CanvasRenderingContext2D, tall: number): void 
 /** Most numbers that are written on the picture. */
 const WRITTEN = 150;
 
-/** Numbers at places of the scene; they follow the camera. `rise` is how far they stand above them, in their own height. */
-function numbersAt(app: App, rise: number): { element: HTMLElement; put(points: { point: Vector3; lux: number }[]): void; update(): void } {
+/** What hides a point is nearer by more than this share of the way: less is the surface that it lies on. */
+const BEFORE = 5e-3;
+
+/** Numbers at places of the scene; they follow the camera. `rise` is how far they stand above them, in their own height; `isAnywhere`:
+ *  whether things may stand before them, whose numbers are left out then. */
+function numbersAt(app: App, rise: number, isAnywhere: boolean): { element: HTMLElement; put(points: { point: Vector3; lux: number }[]): void; update(): void } {
   const element = el('div', { class: 'numbers-over', 'aria-hidden': 'true' });
   let spans: { span: HTMLElement; point: Vector3 }[] = [];
   let last = '';
   const update = () => {
     if (spans.length === 0) return;
     const { camera } = app.stage;
-    const now = camera.matrixWorld.elements.join() + camera.fov + app.stage.canvas.clientWidth;
+    const now = `${camera.matrixWorld.elements.join()} ${camera.fov} ${app.stage.canvas.clientWidth} ${app.stage.moves}`;
     if (now === last) return;
     last = now;
     const taken: [number, number][] = [];
     const page = app.stage.canvas.getBoundingClientRect();
     const scale = document.querySelector('#legend')!.getBoundingClientRect();
+    const isWithin = ({ x, y }: { x: number; y: number }) => x > 0 && y > 0 && x < page.width && y < page.height;
     // A number is this wide and tall at most, and stands above its point.
     const isBehindScale = ({ x, y }: { x: number; y: number }) =>
       scale.width > 0 && x + 20 > scale.left - page.left && x - 20 < scale.right - page.left && y > scale.top - page.top && y - 20 < scale.bottom - page.top;
+    const isHidden = (point: Vector3) => {
+      const way = point.clone().sub(camera.position);
+      const distance = way.length();
+      return app.stage.cast(camera.position, way.divideScalar(distance), (1 - BEFORE) * distance) !== null;
+    };
     for (const { span, point } of spans) {
       const at = app.stage.project(point);
       // Numbers that would lie on each other, or behind the scale, are left out.
-      const isFree = at !== null && !isBehindScale(at) && taken.every(([x, y]) => Math.abs(x - at.x) > 34 || Math.abs(y - at.y) > 15);
+      const isFree = at !== null && isWithin(at) && !isBehindScale(at) && taken.every(([x, y]) => Math.abs(x - at.x) > 34 || Math.abs(y - at.y) > 15)
+        && !(isAnywhere && isHidden(point));
       span.hidden = !isFree;
       if (!at || !isFree) continue;
       taken.push([at.x, at.y]);
@@ -118,14 +129,14 @@ function numbersAt(app: App, rise: number): { element: HTMLElement; put(points: 
 
 /** Numbers at the points of a grid. */
 export function gridNumbers(app: App): { element: HTMLElement; update(): void } {
-  const { element, put, update } = numbersAt(app, 80);
+  const { element, put, update } = numbersAt(app, 80, true);
   app.on('grid', () => put(measured(app)));
   return { element, update };
 }
 
 /** Numbers on isolines, but where there are those of a grid. They are found anew when one stands still. */
 export function lineNumbers(app: App): { element: HTMLElement; update(): void } {
-  const { element, put, update } = numbersAt(app, 0);
+  const { element, put, update } = numbersAt(app, 0, false);
   let last: unknown[] = [];
   return {
     element,

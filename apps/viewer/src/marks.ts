@@ -14,6 +14,11 @@ import type { LightNotice, PlaneAnswer } from './wire';
 const FILL = 0.94;
 const COVER = 0.85;
 
+/** By how much nearer lines and dots are drawn than the surfaces in which they lie, so that these do not hide them, as a factor. Dots are
+ *  as wide as pixels are, and surfaces that are seen along come nearer within one. */
+const WIRES = 1.0015;
+const DOTS = 1.02;
+
 export class Marks {
   private wires = new Map<number, LineSegments>();
   private ring: Group | null = null;
@@ -66,13 +71,7 @@ export class Marks {
       wires.userData.of = surface;
       wires.matrixAutoUpdate = false;
       wires.matrix.copy(surface.matrix);
-      // Lines lie in the surfaces; drawn a little nearer they are seen.
-      wires.onBeforeRender = (_renderer, _scene, camera) => {
-        camera.projectionMatrix.elements[14] *= 1.0015;
-      };
-      wires.onAfterRender = (_renderer, _scene, camera) => {
-        camera.projectionMatrix.elements[14] /= 1.0015;
-      };
+      nearer(wires, WIRES);
       this.wires.set(object, wires);
       this.stage.overlay.add(wires);
     }
@@ -119,7 +118,8 @@ export class Marks {
     this.gridded = null;
     if (grid) {
       const geometry = new BufferGeometry().setFromPoints(open(grid).map((p) => p.point.clone().addScaledVector(grid.normal, 1e-3)));
-      const dots = new Points(geometry, new PointsMaterial({ color: 0xffffff, size: 4, sizeAttenuation: false, depthTest: false, transparent: true }));
+      const dots = new Points(geometry, new PointsMaterial({ color: 0xffffff, size: 4, sizeAttenuation: false, depthWrite: false, transparent: true }));
+      nearer(dots, DOTS);
       dots.renderOrder = 4;
       this.gridded = new Group().add(dots);
       this.stage.tools.add(this.gridded);
@@ -195,6 +195,16 @@ export class Marks {
     }
     return null;
   }
+}
+
+/** Draws something that lies in surfaces a little nearer. */
+function nearer(thing: Object3D, factor: number): void {
+  thing.onBeforeRender = (_renderer, _scene, camera) => {
+    camera.projectionMatrix.elements[14] *= factor;
+  };
+  thing.onAfterRender = (_renderer, _scene, camera) => {
+    camera.projectionMatrix.elements[14] /= factor;
+  };
 }
 
 function lampPicture(): CanvasTexture {

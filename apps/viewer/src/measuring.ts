@@ -104,6 +104,12 @@ export class Measuring {
     this.app.tell('probe');
   }
 
+  /** Whether the point that is picked, or none, still is, and nothing else is laid meanwhile. */
+  private whileProbed(): () => boolean {
+    const { probed, grid, plane } = this;
+    return () => this.probed === probed && this.grid === grid && this.plane === plane;
+  }
+
   private clearProbe(): void {
     this.probed = null;
     this.app.marks.point(null);
@@ -138,18 +144,18 @@ export class Measuring {
     this.raysShown = is;
     if (!is) this.app.marks.rays([]);
     else if (this.probed) this.askProbe();
-    else this.app.say('Pick a point first: its rays are drawn then.');
+    else this.app.say('Pick a point first: its rays are drawn then.', this.whileProbed());
     this.app.tell('view');
   }
 
   /** Lays a grid of measuring points over the surface that was picked. */
   measure(): void {
-    if (!this.probed) return this.app.say('Pick a point of a surface first: the grid is laid over it.');
+    if (!this.probed) return this.app.say('Pick a point of a surface first: the grid is laid over it.', this.whileProbed());
     this.plane = null;
     this.app.marks.plane(null);
     this.grid = lay(this.probed.hit);
     this.gridMoves = -1;
-    if (!this.grid) this.app.say('There is no plane surface to lay a grid over.');
+    if (!this.grid) this.app.say('There is no plane surface to lay a grid over.', this.whileProbed());
     this.readGrid();
     this.asker.begin();
     this.app.tell('grid');
@@ -158,7 +164,7 @@ export class Measuring {
 
   /** Lays a working plane above the floor that was picked. */
   measurePlane(): void {
-    if (!this.probed) return this.app.say('Pick a point of a floor first: the working plane is laid above it.');
+    if (!this.probed) return this.app.say('Pick a point of a floor first: the working plane is laid above it.', this.whileProbed());
     this.clearGrid();
     this.app.say('');
     const { surface, triangle, uv } = this.probed.hit;
@@ -184,7 +190,7 @@ export class Measuring {
     if (!this.plane) return;
     if (!answer) {
       this.clearGrid();
-      return this.app.say(why ?? '');
+      return this.app.say(why ?? '', this.whileProbed());
     }
     this.plane.answer = answer;
     this.app.marks.plane(answer);
@@ -199,8 +205,8 @@ export class Measuring {
       cover(this.app, this.grid, follow(this.grid));
     }
     if (this.grid && open(this.grid).length === 0) {
-      this.app.say('All points of the grid lie beneath things.');
-      return this.clearGrid();
+      this.clearGrid();
+      return this.app.say('All points of the grid lie beneath things.', this.whileProbed());
     }
     if (this.grid) read(this.grid, this.app.layer === 'total', this.app.stage);
     this.app.marks.grid(this.grid);

@@ -52,7 +52,7 @@ export function rangeOf(values: number[]): [number, number] | null {
     const steps = [1, 1.5, 2, 3, 5, 7, 10];
     const lead = x / decade;
     const step = up ? steps.find((s) => s >= lead * 0.999) : steps.findLast((s) => s <= lead * 1.001);
-    return (step ?? 1) * decade;
+    return Number(((step ?? 1) * decade).toPrecision(2));
   };
   const [from, to] = [round(low, false), round(high, true)];
   return to > from ? [from, to] : [from, 2 * from];

@@ -38,8 +38,16 @@ const IN_A_ROW = 4;
 /** Milliseconds of rest before all is drawn sharp. */
 const REST = 250;
 
+/** Milliseconds that a picture waits for the light of a layer that was just chosen, and for the rest of it after the first: one that is
+ *  dark takes as long to draw as one that is not, which is a second where the processor draws. */
+const PATIENCE = 400;
+const TOGETHER = 40;
+
 /** The picture that the meter sees. */
 export const METER = [64, 40];
+
+/** Places that are looked at where a scale is wanted at once: some milliseconds of rays. */
+const SAMPLED = [32, 20];
 
 /** What the meter saw: luminance and illuminance of the pixels that show a surface. */
 export interface Metered {
@@ -69,10 +77,15 @@ export class Stage {
   /** Counts what came, went or moved. */
   moves = 0;
   private dirty = true;
+  /** Nothing is drawn before. */
+  private heldUntil = 0;
+  private isAwaited = false;
   private boxes = new Map<number, Box3>();
   private sky: Mesh<SphereGeometry, ShaderMaterial>;
   private meter = new WebGLRenderTarget(METER[0], METER[1], { type: FloatType, format: RGBAFormat });
   private isMetering = false;
+  /** What is seen at places all over the canvas, and from where. */
+  private seen: { view: string; hits: Hit[] } = { view: '', hits: [] };
   /** Of `SHARPNESS`: in motion, and now. */
   private coarseness = 0;
   private drawn = 0;
@@ -203,6 +216,19 @@ export class Stage {
     this.change();
   }
 
+  /** No light is known, but some will come: pictures wait for it. */
+  await(): void {
+    for (const surface of this.surfaces.values()) this.darken(surface);
+    this.isAwaited = true;
+    this.heldUntil = performance.now() + PATIENCE;
+  }
+
+  /** What was awaited begins to come. */
+  begun(): void {
+    if (this.isAwaited) this.heldUntil = Math.min(this.heldUntil, performance.now() + TOGETHER);
+    this.isAwaited = false;
+  }
+
   /** None of its light is known. */
   darken(surface: Surface): void {
     this.shine(surface, 0, new Uint16Array(surface.light.array.length + 3 * this.cuts.count(surface)));
@@ -244,6 +270,7 @@ export class Stage {
 
   /** Draws if there is something new; else a tree of boxes is built where one is missing. */
   draw(now: number): void {
+    if (performance.now() < this.heldUntil) return;
     if (!this.dirty && this.drawn > 0 && now - this.lastFrame > REST) this.resize(0);
     if (!this.dirty) {
       for (const surface of this.surfaces.values()) {
@@ -370,6 +397,18 @@ export class Stage {
     this.camera.updateMatrixWorld();
     const matrix = this.root.matrixWorld.clone().invert().multiply(this.camera.matrixWorld);
     return { name, matrix: matrix.toArray(), fov: this.fov };
+  }
+
+  /** Illuminance at places all over the canvas, as far as it has come, lx. Nothing is drawn for it, which takes a second where the
+   *  processor draws. */
+  sampled(): number[] {
+    const view = `${this.camera.matrixWorld.elements.join()} ${this.camera.fov} ${this.camera.aspect} ${this.moves}`;
+    if (view !== this.seen.view) {
+      const [across, down] = SAMPLED;
+      const places = Array.from({ length: across * down }, (_, i) => this.pick((2 * (i % across) + 1) / across - 1, (2 * Math.floor(i / across) + 1) / down - 1));
+      this.seen = { view, hits: places.filter((hit) => hit !== null) };
+    }
+    return this.seen.hits.map(({ surface, triangle, uv }) => this.lux(surface, triangle, uv));
   }
 
   /** What the eye is exposed to. */

@@ -123,6 +123,22 @@ test('points of a grid beneath things are left out and counted', async () => {
   assert.ok(laid.covered > 1, `${laid.covered}`);
   assert.ok(laid.least > 0.02 * laid.mean, `${laid.least} of ${laid.mean} lx: nothing is read beneath them`);
   assert.match(await page.locator('#grid .facts').textContent(), new RegExp(`Points${laid.count - laid.covered}Covered, left out${laid.covered}`));
+  // Numbers are written where the floor is seen, and not on the blocks that hide it.
+  const numbers = await page.evaluate(() => {
+    const { app } = window.radiosity;
+    const [width, height] = [app.stage.canvas.clientWidth, app.stage.canvas.clientHeight];
+    const places = app.measuring.grid.points.filter(({ isCovered }) => !isCovered).map(({ point }) => {
+      const { x, y } = app.stage.project(point);
+      const seen = app.stage.pick((2 * x) / width - 1, 1 - (2 * y) / height);
+      return { x, y, isSeen: seen !== null && seen.point.distanceTo(point) < 1e-3 };
+    });
+    const written = [...document.querySelectorAll('.numbers-over span:not([hidden])')].map((span) => {
+      const [, x, y] = /^translate\((.*?)px, (.*?)px\)/.exec(span.style.transform).map(Number);
+      return places.find((place) => Math.hypot(place.x - x, place.y - y) < 0.2).isSeen;
+    });
+    return { written, hidden: places.filter(({ isSeen }) => !isSeen).length };
+  });
+  assert.ok(numbers.hidden > 1 && numbers.written.length > 3 && numbers.written.every((isSeen) => isSeen), JSON.stringify(numbers));
   // Each point is measured by rays of its own, however wide the elements are.
   await page.waitForFunction(() => window.radiosity.app.measuring.grid.answer?.is_done);
   const own = await page.evaluate(() => window.radiosity.app.measuring.grid.points.filter(({ isCovered }) => !isCovered).map(({ point: { x, y, z }, lux }) => [x, y, z, 0, 1, 0, lux]));
@@ -344,6 +360,12 @@ test('a click brings the meter into view, and after a change no time is told tha
     await page.waitForFunction(() => window.radiosity.state().probe !== null);
     assert.equal(await isSeen(), true);
   }
+  // What is read of where light comes from is all of it.
+  for (const list of [0, 1]) {
+    const told = await page.locator('#meter .bars').nth(list).locator('b').allTextContents();
+    const parts = told.map((text) => Math.round(10 * Number(/^(\d+\.\d) %$/.exec(text)[1])));
+    assert.equal(parts.reduce((a, b) => a + b, 0), 1000, `${told}`);
+  }
 
   const { edits } = (await state(page)).status;
   const told = () => page.locator('#left').textContent();
@@ -363,11 +385,22 @@ test('noise is shown in false colours, and the eye stays as it was', async () =>
   const lit = () => page.evaluate(() => document.querySelector('#colours [aria-checked=true]').dataset.value);
   const { exposure } = await state(page);
   assert.equal(await lit(), 'eye');
-  await page.locator('#layer').selectOption('"relative_error"');
+  // The first picture of it has its scale: where the processor draws, one takes a second.
+  const first = await page.evaluate(async () => {
+    const { app } = window.radiosity;
+    const { frames } = app.stage;
+    const layer = document.querySelector('#layer');
+    layer.value = '"relative_error"';
+    layer.dispatchEvent(new Event('change'));
+    while (app.stage.frames === frames) await new Promise((next) => { requestAnimationFrame(next); });
+    return app.exposure.range;
+  });
   await done(page);
   await pixels(page);
+  const range = await page.evaluate(() => window.radiosity.app.exposure.range);
+  first.forEach((end, i) => assert.ok(end < 2.1 * range[i] && end > range[i] / 2.1, `${first} ${range}`));
   assert.equal(await lit(), 'lux');
-  const [low, high] = await page.evaluate(() => window.radiosity.app.exposure.range);
+  const [low, high] = range;
   assert.ok(low > 0 && high < 100, `${low} to ${high} %`);
   assert.equal((await state(page)).exposure, exposure);
   // As seen there is light alone.
@@ -554,6 +587,32 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   const page = await pages.open(program.url);
   await done(page);
   const wall = (await state(page)).objects.find(({ name }) => name === 'left');
+  // What is said of something goes with it.
+  const told = async (act, holds) => {
+    const message = await page.evaluate(act);
+    assert.match(message, holds);
+    return () => state(page).then((now) => assert.equal(now.message, '', message));
+  };
+  const selected = await told(() => {
+    window.radiosity.app.selectNext(1);
+    return window.radiosity.app.message;
+  }, /^Selected: /);
+  await page.evaluate((id) => window.radiosity.app.select(id), wall.id);
+  await selected();
+  const unpicked = await told(() => {
+    window.radiosity.app.measuring.measure();
+    return window.radiosity.app.message;
+  }, /^Pick a point/);
+  await page.evaluate(() => window.radiosity.app.measuring.pick(0, -0.9));
+  await unpicked();
+  await page.keyboard.press('Insert');
+  await page.waitForFunction(() => /^Added: Lamp 1/.test(window.radiosity.app.message));
+  const deleted = await told(() => {
+    window.radiosity.app.adding.delete();
+    return window.radiosity.app.message;
+  }, /^Deleted: Lamp 1\. Undo/);
+  await restored(page);
+  await deleted();
   await page.evaluate((id) => window.radiosity.app.select(id), wall.id);
   const reflectance = page.getByLabel('Mean reflectance, percent');
   const before = await reflectance.inputValue();
@@ -564,8 +623,9 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   assert.equal((await state(page)).undo, null);
   // More than a surface of this colour can reflect.
   await reflectance.fill('150');
+  const { edits } = (await state(page)).status;
   await reflectance.press('Enter');
-  await done(page, 1);
+  await done(page, edits + 1);
   const has = await reflectance.elementHandle();
   await page.waitForFunction(([field, before]) => field.value !== before && Number(field.value) < 99, [has, before]);
   const most = Number(await reflectance.inputValue());

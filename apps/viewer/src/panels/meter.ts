@@ -35,14 +35,24 @@ export function meterPanel(app: App): HTMLElement {
       fact('Luminance', `${readable(luminance(answer.radiosity) / Math.PI)} cd/m²`),
       fact('Place', `${point.toArray().map((x) => coordinate(x, 2)).join(', ')} m`),
     );
-    lights.replaceChildren(...answer.lights.map(bar));
-    surfaces.replaceChildren(...answer.surfaces.map(bar));
+    lights.replaceChildren(...bars(answer.lights));
+    surfaces.replaceChildren(...bars(answer.surfaces));
   });
   return section('meter', 'Light meter', true, none, body);
 }
 
-function bar({ name, share }: Share): HTMLElement {
-  return el('div', { class: 'bar' }, el('span', {}, name), el('b', {}, `${(100 * share).toFixed(1)} %`), el('i', { style: `width:${Math.min(100, 100 * share)}%` }));
+/** Parts of a percent that are told. */
+const PARTS = 10;
+
+/** Shares as bars. They are rounded so that what is read adds up to what they are together: what is left of those that lose most goes up. */
+function bars(shares: Share[]): HTMLElement[] {
+  const exact = shares.map(({ share }) => 100 * PARTS * share);
+  const parts = exact.map(Math.floor);
+  const missing = Math.round(exact.reduce((a, b) => a + b, 0)) - parts.reduce((a, b) => a + b, 0);
+  const byLoss = exact.map((_, i) => i).sort((i, j) => exact[j] - parts[j] - (exact[i] - parts[i]));
+  for (const i of byLoss.slice(0, missing)) parts[i] += 1;
+  return shares.map(({ name, share }, i) => el('div', { class: 'bar' },
+    el('span', { title: name }, name), el('b', {}, `${(parts[i] / PARTS).toFixed(1)} %`), el('i', { style: `width:${Math.min(100, 100 * share)}%` })));
 }
 
 /** Why a plane may have few points. */

@@ -173,14 +173,15 @@ impl Solver {
         if !lights.is_empty() && rest > LEAST_TOLD {
             lights.push(Share { name: "not told apart yet".to_owned(), share: rest });
         }
+        let surfaces = shares("other surfaces", std::iter::once(straight).chain(surfaces));
         ProbeAnswer {
             illuminance: probe.lux,
             error: probe.error,
             irradiance: probe.irradiance,
             reflectance: probe.reflectance,
             radiosity: probe.radiosity,
-            lights,
-            surfaces: shares("other surfaces", std::iter::once(straight).chain(surfaces)),
+            lights: whole(lights),
+            surfaces: whole(surfaces),
         }
     }
 
@@ -216,7 +217,7 @@ impl Solver {
     }
 }
 
-/// The largest shares, and what those left out bring together; primitives of one name are one thing to people.
+/// The largest shares, and what those left out bring together, however little each; primitives of one name are one thing to people.
 fn shares(others: &str, named: impl Iterator<Item = (String, f32)>) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     for (name, share) in named {
@@ -225,12 +226,19 @@ fn shares(others: &str, named: impl Iterator<Item = (String, f32)>) -> Vec<Share
             None => shares.push(Share { name, share }),
         }
     }
-    shares.retain(|known| known.share >= LEAST_SHARE);
     shares.sort_by(|a, b| b.share.total_cmp(&a.share));
-    let rest: f32 = shares.drain(MOST_SOURCES.min(shares.len())..).map(|left_out| left_out.share).sum();
+    let named = shares.iter().take(MOST_SOURCES).take_while(|known| known.share >= LEAST_SHARE).count();
+    let rest: f32 = shares.drain(named..).map(|left_out| left_out.share).sum();
     if rest >= LEAST_SHARE {
         shares.push(Share { name: others.to_owned(), share: rest });
     }
+    shares
+}
+
+/// Shares of all that is told: people add them up. What is not told is less than [`LEAST_TOLD`].
+fn whole(mut shares: Vec<Share>) -> Vec<Share> {
+    let sum: f32 = shares.iter().map(|known| known.share).sum();
+    shares.iter_mut().for_each(|known| known.share /= sum);
     shares
 }
 
@@ -246,5 +254,22 @@ mod tests {
         assert_eq!((told[0].name.as_str(), told[MOST_SOURCES].name.as_str()), ("lamp 0", "other lights"));
         let sum: f32 = told.iter().map(|told| told.share).sum();
         assert!((told[0].share - 0.152).abs() < 1e-6 && (sum - 13.0 * 0.076).abs() < 1e-5);
+    }
+
+    /// Each of them was left out as too little, and the rest did not add up to 100 %.
+    #[test]
+    fn what_is_little_is_told_together_with_what_else_is() {
+        let books = (0..8).map(|k| (format!("book {k}"), 0.0005));
+        let told = whole(shares("other surfaces", std::iter::once(("ceiling".to_owned(), 0.996)).chain(books)));
+        assert_eq!(told.iter().map(|told| told.name.as_str()).collect::<Vec<_>>(), ["ceiling", "other surfaces"]);
+        assert!((told[1].share - 0.004).abs() < 1e-6 && (told[0].share - 0.996).abs() < 1e-6, "{}", told[1].share);
+        // What is less than is told at all is spread over the rest.
+        let told = whole(shares(
+            "other lights",
+            [("lamp", 0.6), ("sun", 0.39), ("sky", 0.0002)].map(|(n, s)| (n.to_owned(), s)).into_iter(),
+        ));
+        assert_eq!(told.len(), 2);
+        assert!((told.iter().map(|told| told.share).sum::<f32>() - 1.0).abs() < 1e-6);
+        assert!(whole(Vec::new()).is_empty());
     }
 }
