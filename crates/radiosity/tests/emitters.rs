@@ -162,7 +162,10 @@ fn a_sun_in_the_sky_is_measured_and_certified() {
     }
     let mut scene = Scene { materials: vec![Material::default()], up: Up::Z, ..Scene::default() };
     scene.add_quad("floor", 0, square(2.0, 0.0, true));
-    scene.set_sky(Sky::Map { width, height, pixels }, "clear.hdr");
+    let sky = Sky::Map { width, height, pixels };
+    scene.set_sky(sky.clone(), "clear.hdr");
+    // A file that was written of it has its sun, and is opened under the same sky.
+    scene.set_sky(sky, "clear.hdr");
     assert_eq!(scene.lights.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["sun of clear.hdr"]);
 
     let mesh = Mesh::new(&scene);

@@ -1,7 +1,9 @@
 //! A scene, flattened: every placed triangle in world space, with what the author said about it.
 
 use crate::material::MAX_REFLECTANCE;
-use crate::{AlphaMode, Bands, Camera, Faults, Material, PointLight, Sky, Texture, TextureRef, counted};
+use crate::{
+    AlphaMode, Bands, Camera, Faults, Material, PointLight, PointLightKind, Sky, Texture, TextureRef, counted,
+};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::ops::Range;
 
@@ -181,9 +183,12 @@ impl Scene {
     }
 
     /// Makes a sky what escaping rays see. The suns of a map become directional lights called "sun of `name`", on top of
-    /// the scene's own ([`Sky::take_suns`] says which and what is lost). Set [`Scene::up`] before.
+    /// the scene's own ([`Sky::take_suns`] says which and what is lost), but for those of that name: a file that was written of the
+    /// scene under this sky has its suns as lamps, and they would shine twice. Set [`Scene::up`] before.
     pub fn set_sky(&mut self, mut sky: Sky, name: &str) {
-        self.lights.extend(sky.take_suns(&format!("sun of {name}"), self.up.direction()));
+        let name = format!("sun of {name}");
+        self.lights.retain(|light| light.kind != PointLightKind::Directional || light.name != name);
+        self.lights.extend(sky.take_suns(&name, self.up.direction()));
         self.sky = sky;
     }
 

@@ -10,7 +10,7 @@ pub fn edited(export: Export) -> Result<Vec<u8>, WriteError> {
     scene_glb(&export.scene)
 }
 
-/// The elements of the scene with the light at their vertices (attribute `_IRRADIANCE`, lx).
+/// The elements of the scene with the light at their vertices (attribute `_IRRADIANCE`, lx); lamps are put aside.
 pub fn lit(export: Export) -> Result<Vec<u8>, WriteError> {
     let Export { scene: edited, model, light } = export;
     let mut scene = Scene {
@@ -19,6 +19,7 @@ pub fn lit(export: Export) -> Result<Vec<u8>, WriteError> {
         materials: edited.materials.into_iter().map(plain_texture).collect(),
         textures: edited.textures,
         cameras: edited.cameras,
+        lights: edited.lights,
         ..Scene::default()
     };
     let there = model.objects.iter().zip(light).filter(|(object, _)| !object.deleted && !object.indices.is_empty());

@@ -8,19 +8,35 @@ use radiosity_scene::{Camera, Faults, PointLight, PointLightKind, Projection};
 use serde_json::Value;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// Lights of the placed nodes, in their order. They shine along −Z of their node, whose scale is ignored.
-pub(crate) fn lights(document: &Document, placed: &[Placed], file: &str, faults: &mut Faults) -> Vec<PointLight> {
+/// Lights of the placed nodes, in their order, and how many of them were put aside when the model was lit: they shine again, as all
+/// light is computed anew. They shine along −Z of their node, whose scale is ignored.
+pub(crate) fn lights(
+    document: &Document,
+    placed: &[Placed],
+    file: &str,
+    faults: &mut Faults,
+) -> (Vec<PointLight>, usize) {
     let all = document.json.pointer("/extensions/KHR_lights_punctual").map_or(&[][..], |e| list(e, "lights"));
     let mut out = Vec::new();
+    let mut put_aside = 0;
     for at in placed {
-        let node = list(&document.json, "nodes").get(at.node);
-        let Some(index) = node.and_then(|node| node.pointer("/extensions/KHR_lights_punctual/light")) else { continue };
-        let Some(json) = whole(index).and_then(|index| all.get(index)) else {
-            let what = format!("light {} of {}", shown(Some(index)), all.len());
-            faults.error(format!("{file}: nodes[{}]", at.node), what, "export the model again");
-            continue;
+        let Some(node) = list(&document.json, "nodes").get(at.node) else { continue };
+        let aside = node.pointer("/extras/KHR_lights_punctual").filter(|own| !text(own, "type").is_empty());
+        let (json, place) = match (node.pointer("/extensions/KHR_lights_punctual/light"), aside) {
+            (Some(index), _) => {
+                let Some(json) = whole(index).and_then(|index| all.get(index)) else {
+                    let what = format!("light {} of {}", shown(Some(index)), all.len());
+                    faults.error(format!("{file}: nodes[{}]", at.node), what, "export the model again");
+                    continue;
+                };
+                (json, format!("{file}: extensions.KHR_lights_punctual.lights[{}]", shown(Some(index))))
+            }
+            (None, Some(json)) => {
+                put_aside += 1;
+                (json, format!("{file}: nodes[{}].extras.KHR_lights_punctual", at.node))
+            }
+            (None, None) => continue,
         };
-        let place = format!("{file}: extensions.KHR_lights_punctual.lights[{}]", shown(Some(index)));
         if let Some(mut light) = light(json, at, &place, faults) {
             light.name = match text(json, "name") {
                 "" => name_of(document, at.node, None),
@@ -29,7 +45,7 @@ pub(crate) fn lights(document: &Document, placed: &[Placed], file: &str, faults:
             out.push(light);
         }
     }
-    out
+    (out, put_aside)
 }
 
 fn light(json: &Value, at: &Placed, place: &str, faults: &mut Faults) -> Option<PointLight> {
@@ -138,12 +154,15 @@ mod tests {
                 {"extensions": light(0), "translation": [1, 2, 3], "scale": [9, 9, 9], "name": "spot"},
                 {"extensions": light(1), "rotation": [-half, 0, 0, half]},
                 {"extensions": light(2)}, {"extensions": light(7)},
+                {"extras": {"KHR_lights_punctual": {"type": "point", "intensity": 3}}, "translation": [0, 1, 0], "name": "aside"},
+                {"extras": {"KHR_lights_punctual": "a remark"}},
                 {"camera": 0, "translation": [0, 0, 5], "scale": [2, 2, 2], "name": "eye"}, {"camera": 1}]});
         let document = Document { json, ..Document::default() };
         let mut faults = Faults::default();
         let placed = nodes::placed(&document, "t", &mut faults);
-        let lights = lights(&document, &placed, "t", &mut faults);
-        assert_eq!(lights.len(), 2);
+        let (lights, put_aside) = lights(&document, &placed, "t", &mut faults);
+        assert_eq!((lights.len(), put_aside), (3, 1));
+        assert_eq!((lights[2].name.as_str(), lights[2].position, lights[2].intensity), ("aside", DVec3::Y, [3.0; 3]));
         assert_eq!((lights[0].name.as_str(), lights[0].range), ("spot", Some(4.0)));
         assert_eq!(lights[0].kind, PointLightKind::Spot { inner: 0.1, outer: FRAC_PI_4 });
         assert_eq!((lights[0].position, lights[0].intensity), (DVec3::new(1.0, 2.0, 3.0), [10.0, 5.0, 0.0]));

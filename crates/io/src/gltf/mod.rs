@@ -6,6 +6,7 @@ pub mod document;
 mod extensions;
 pub(crate) mod json;
 mod light;
+mod lit;
 mod material;
 mod meshopt;
 pub(crate) mod nodes;

@@ -8,7 +8,7 @@
 use super::json::{list, shown, whole};
 use super::nodes::{self, Placed};
 use super::primitive::{self, Geometry};
-use super::{Document, extensions, light, material};
+use super::{Document, extensions, light, lit, material};
 use crate::assemble::{Assembly, Part};
 use crate::{LoadError, LoadOptions, Loaded, Source};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
@@ -29,7 +29,9 @@ pub fn load(file: &str, bytes: &[u8], source: &dyn Source, options: &LoadOptions
     let mut assembly = Assembly::new(options);
     assembly.scene.materials = materials.materials;
     assembly.scene.textures = materials.textures;
-    assembly.scene.lights = light::lights(&document, &placed, file, &mut faults);
+    let (lights, put_aside) = light::lights(&document, &placed, file, &mut faults);
+    assembly.scene.lights = lights;
+    lit::warn(&document, put_aside, file, &mut faults);
     assembly.scene.cameras = light::cameras(&document, &placed, file, &mut faults);
     assembly.scene.up = options.up.unwrap_or_default();
 

@@ -1,6 +1,7 @@
 //! Lamps whose light has been written shine no second time: KHR_lights_punctual leaves the nodes that were lit. The
 //! light's definition stays there as `extras.KHR_lights_punctual`, for whoever wants the lamp back, and so do the node,
-//! its name and what animates it. A scene that is written to be lit later has them where they were.
+//! its name and what animates it. A scene that is written to be lit later has them where they were. Our own reader takes those that
+//! were put aside, as it computes all light anew.
 
 use super::glb::Builder;
 use crate::gltf::Document;
@@ -41,39 +42,49 @@ pub(super) fn put_in(builder: &mut Builder, lamps: &[PointLight]) -> Vec<usize> 
         return Vec::new();
     }
     builder.uses(NAME);
-    let mut nodes = Vec::new();
-    let mut definitions = Vec::new();
-    for lamp in lamps {
-        // Colours end at 1; the intensity carries the rest.
-        let intensity = lamp.intensity.iter().copied().fold(0.0, f32::max);
-        let scale = if intensity > 0.0 { intensity } else { 1.0 };
-        let kind = match lamp.kind {
-            PointLightKind::Point => "point",
-            PointLightKind::Spot { .. } => "spot",
-            PointLightKind::Directional => "directional",
-        };
-        let mut definition = json!({
-            "name": lamp.name, "type": kind, "intensity": intensity, "color": lamp.intensity.map(|i| i / scale),
-        });
-        if let PointLightKind::Spot { inner, outer } = lamp.kind {
-            definition["spot"] = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
-        }
-        if let Some(range) = lamp.range.filter(|_| lamp.kind != PointLightKind::Directional) {
-            definition["range"] = json!(range);
-        }
-        definitions.push(definition);
-        // Lamps shine along −Z of their nodes; the place of parallel light means nothing.
-        let turn = DQuat::from_rotation_arc(DVec3::NEG_Z, lamp.direction.try_normalize().unwrap_or(DVec3::NEG_Z));
-        let place = if lamp.position.is_finite() { lamp.position } else { DVec3::ZERO };
-        let matrix = DMat4::from_rotation_translation(turn, place).to_cols_array();
-        let light = json!({ NAME: { "light": definitions.len() - 1 } });
-        nodes.push(builder.push("nodes", json!({ "name": lamp.name, "matrix": matrix, "extensions": light })));
-    }
+    let definitions: Vec<Value> = lamps.iter().map(definition).collect();
     let extensions = builder.json.entry("extensions").or_insert_with(|| json!({}));
     if let Some(extensions) = extensions.as_object_mut() {
         extensions.insert(NAME.into(), json!({ "lights": definitions }));
     }
-    nodes
+    let light = |index| ("extensions", json!({ NAME: { "light": index } }));
+    lamps.iter().enumerate().map(|(index, lamp)| node(builder, lamp, light(index))).collect()
+}
+
+/// Writes lamps whose light is in the surfaces of the file, for whoever wants them back; their nodes come back.
+pub(super) fn put_aside(builder: &mut Builder, lamps: &[PointLight]) -> Vec<usize> {
+    lamps.iter().map(|lamp| node(builder, lamp, ("extras", json!({ NAME: definition(lamp) })))).collect()
+}
+
+/// A lamp as the extension defines it.
+fn definition(lamp: &PointLight) -> Value {
+    // Colours end at 1; the intensity carries the rest.
+    let intensity = lamp.intensity.iter().copied().fold(0.0, f32::max);
+    let scale = if intensity > 0.0 { intensity } else { 1.0 };
+    let kind = match lamp.kind {
+        PointLightKind::Point => "point",
+        PointLightKind::Spot { .. } => "spot",
+        PointLightKind::Directional => "directional",
+    };
+    let mut definition = json!({
+        "name": lamp.name, "type": kind, "intensity": intensity, "color": lamp.intensity.map(|i| i / scale),
+    });
+    if let PointLightKind::Spot { inner, outer } = lamp.kind {
+        definition["spot"] = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
+    }
+    if let Some(range) = lamp.range.filter(|_| lamp.kind != PointLightKind::Directional) {
+        definition["range"] = json!(range);
+    }
+    definition
+}
+
+/// A node where a lamp stands, with what is said of it there.
+fn node(builder: &mut Builder, lamp: &PointLight, (name, own): (&str, Value)) -> usize {
+    // Lamps shine along −Z of their nodes; the place of parallel light means nothing.
+    let turn = DQuat::from_rotation_arc(DVec3::NEG_Z, lamp.direction.try_normalize().unwrap_or(DVec3::NEG_Z));
+    let place = if lamp.position.is_finite() { lamp.position } else { DVec3::ZERO };
+    let matrix = DMat4::from_rotation_translation(turn, place).to_cols_array();
+    builder.push("nodes", json!({ "name": lamp.name, "matrix": matrix, name: own }))
 }
 
 /// Removes an extension from an object, and `extensions` where it was the last.

@@ -15,21 +15,21 @@ use std::io::Cursor;
 /// What `asset.generator` says.
 pub(super) const GENERATOR: &str = concat!("radiosity ", env!("CARGO_PKG_VERSION"));
 
-/// The scene with light on its surfaces, and so without lamps: they would light it a second time.
+/// The scene with light on its surfaces, and its lamps put aside: they would light it a second time.
 pub(super) fn lit(scene: &Scene, primitives: &[LitPrimitive], style: &Style) -> Result<Vec<u8>, WriteError> {
-    build(scene, primitives, style, &[])
+    build(scene, primitives, style, lamps::put_aside)
 }
 
 /// The scene to be lit, with its lamps.
 pub(super) fn dark(scene: &Scene) -> Result<Vec<u8>, WriteError> {
-    build(scene, &[], &Style::Vertices, &scene.lights)
+    build(scene, &[], &Style::Vertices, lamps::put_in)
 }
 
 fn build(
     scene: &Scene,
     primitives: &[LitPrimitive],
     style: &Style,
-    lamps: &[PointLight],
+    put: fn(&mut Builder, &[PointLight]) -> Vec<usize>,
 ) -> Result<Vec<u8>, WriteError> {
     let mut builder = Builder::default();
     builder.json.insert("asset".into(), json!({ "version": "2.0", "generator": GENERATOR }));
@@ -73,7 +73,7 @@ fn build(
         let matrix = camera.world_from_camera.to_cols_array().map(|x| x as f32);
         children.push(builder.push("nodes", json!({ "name": camera.name, "camera": index, "matrix": matrix })));
     }
-    children.extend(lamps::put_in(&mut builder, lamps));
+    children.extend(put(&mut builder, &scene.lights));
     if let Some(root) = builder.list("nodes").get_mut(root) {
         if !children.is_empty() {
             root["children"] = json!(children);

@@ -199,10 +199,13 @@ fn lamps_that_were_baked_shine_no_second_time() {
         let before = load(source.to_string().as_bytes());
         assert_eq!(before.scene.lights.len(), 1);
         let lit = halved(&before.scene, at_vertices);
-        load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &Style::Vertices).unwrap())
+        let after = load(&lit_glb(&before.scene, before.document.as_ref(), &lit, &Style::Vertices).unwrap());
+        (before.scene.lights, after)
     };
-    let after = lit(&source);
-    assert!(after.scene.lights.is_empty());
+    let (lamps, after) = lit(&source);
+    // Who lights it anew has them again.
+    let told = "carries light at its vertices (_IRRADIANCE), which is not used: light is computed anew, and the lamp that was put aside";
+    assert!(after.scene.lights == lamps && after.faults.to_string().contains(told), "{}", after.faults);
     let json = &after.document.unwrap().json;
     assert_eq!(json["nodes"][5], json!({ "name": "a", "extras": { "KHR_lights_punctual": bulb } }));
     assert_eq!((json.get("extensions"), json.get("extensionsUsed")), (None, None));
@@ -211,7 +214,7 @@ fn lamps_that_were_baked_shine_no_second_time() {
     source["scenes"] = json!([{ "nodes": [0, 1, 2, 3, 4] }, { "nodes": [7] }]);
     let nodes = source["nodes"].as_array_mut().unwrap();
     nodes.push(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
-    let after = lit(&source);
+    let (_, after) = lit(&source);
     let json = &after.document.unwrap().json;
     assert_eq!(json["nodes"][7]["extensions"]["KHR_lights_punctual"]["light"], 0);
     assert_eq!(json["extensions"]["KHR_lights_punctual"]["lights"][0], bulb);
@@ -258,6 +261,14 @@ fn a_lightmap_goes_onto_the_material_in_the_next_free_set() {
     let texture = &json["textures"][light["index"].as_u64().unwrap() as usize];
     assert_eq!(texture["extras"]["encoding"], "linear");
     assert_eq!(texture["extras"]["scale"], 200.0);
+    assert!(
+        after
+            .faults
+            .to_string()
+            .contains("carries a lightmap (MOZ_lightmap), which is not used: light is computed anew ("),
+        "{}",
+        after.faults
+    );
     let names =
         |json: &Value| json["materials"].as_array().unwrap().iter().map(|m| m["name"].clone()).collect::<Vec<_>>();
     assert_eq!(names(json), ["paint", "unused"]);
@@ -323,6 +334,8 @@ fn unlit_colours_are_exposed_luminance_and_lamps_shine() {
         2,
         "of our own materials, those in use are written"
     );
+    let told = load(&bytes).faults.to_string();
+    assert!(told.contains("(--unlit), which are taken for paint"), "{told}");
     // The wall: E/π = 1 cd/m² times the albedo and the exposure.
     let (wall, factor) = color(0);
     assert!((wall[0] - 0.005).abs() < 1e-6 && factor == 1.0, "{wall:?}");
@@ -544,6 +557,18 @@ fn a_dark_scene_keeps_its_lamps_and_cameras() {
         assert!(a.kind == Kind::Directional || a.position.distance(b.position) < 1e-6, "{b:?}");
         assert!(a.kind == Kind::Point || a.direction.distance(b.direction) < 1e-6, "{b:?}");
     }
+    // Beside their light they are put aside, where other programs do not look.
+    let lit = halved(&scene, at_vertices);
+    let glb = gltf::load(
+        "t.glb",
+        &plain::lit(&scene, &lit, &Style::Vertices).unwrap(),
+        &Memory::default(),
+        &LoadOptions::default(),
+    )
+    .unwrap();
+    assert!(!glb.document.unwrap().json["extensionsUsed"].to_string().contains("KHR_lights_punctual"));
+    assert_eq!(glb.scene.lights, back.lights);
+    assert!(glb.faults.to_string().contains("and 3 lamps that were put aside in it shine again"), "{}", glb.faults);
     assert_eq!(back.materials[0].emissive, scene.materials[0].emissive);
     let place = back.cameras[0].world_from_camera.w_axis.truncate();
     assert!(place.distance(eye) < 1e-5, "{place}");
