@@ -13,7 +13,7 @@ import { Sight } from './sight';
 import { Stage } from './stage';
 import { Mode, shared, Surface } from './surface';
 import {
-  Connection, type CameraPlace, type Edit, type Layer, type LightFrame, type LightNotice, type MeshFrame, type Notice,
+  Connection, type CameraPlace, type Edit, type Layer, type LightFrame, type LightNotice, type Lost, type MeshFrame, type Notice,
   type ObjectNotice, type SceneNotice, type StatusNotice, type TextureUse,
 } from './wire';
 
@@ -52,6 +52,8 @@ export class App {
   redoable: string | null = null;
   isConnected = false;
   isCaughtUp = false;
+  /** Why it is not connected. */
+  lost: Lost = 'unknown';
   /** Milliseconds from the beginning of the page to the whole scene. */
   opened: number | null = null;
   layer: Layer = 'total';
@@ -93,6 +95,10 @@ export class App {
       cuts: (frame) => this.stage.cut(frame),
       light: (frame) => this.shine(frame),
       connected: (is) => this.connected(is),
+      lost: (why) => {
+        this.lost = why;
+        this.tell('connection');
+      },
     });
     // Once for all that comes between two pictures, however many objects that are.
     this.on('selection', () => {
@@ -162,6 +168,7 @@ export class App {
     if (is === this.isConnected) return;
     this.isConnected = is;
     this.isCaughtUp = false;
+    this.lost = 'unknown';
     // The server did not hear what waited to be said.
     if (!is) this.drop();
     if (is) {

@@ -2,7 +2,7 @@
 // longer side, or the shorter one where that is half of it or less. The number of cells is rounded up, so that they are
 // never larger. A grid stays where it was laid, goes with its surface, and is read again when light changes.
 import { DoubleSide, Ray, Vector3 } from 'three';
-import { barycentric, corners, type Hit, type Stage } from './stage';
+import { barycentric, corners, type Place, type Stage } from './stage';
 import type { Surface } from './surface';
 import type { SurveyAnswer } from './wire';
 
@@ -100,7 +100,7 @@ export function rectangle(points: Vector3[], origin: Vector3, normal: Vector3, s
 }
 
 /** Lays a grid over the plane that was hit. */
-export function lay({ surface, triangle, uv }: Hit): Grid | null {
+export function lay({ surface, triangle, uv }: Place): Grid | null {
   const world = (k: number) => corners(surface, k).map((p) => p.applyMatrix4(surface.matrixWorld));
   const normalOf = ([a, b, c]: Vector3[]) => b.clone().sub(a).cross(c.clone().sub(a)).normalize();
   const first = world(triangle);

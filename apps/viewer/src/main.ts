@@ -17,6 +17,13 @@ import { tests } from './tests';
 /** Farther than this a press is a drag, CSS pixels. */
 const CLICK = 5;
 
+/** What is said while there is no connection. */
+const LOST = {
+  unknown: 'The connection was lost; what is seen is from before. Trying again …',
+  silent: 'The program does not answer; what is seen is from before. If it has ended, start it again and open the address that it prints.',
+  strange: 'The program of this page has ended, and another was started since: open the address that it printed.',
+};
+
 /** On narrower pages the panel begins folded. */
 const NARROW = 760;
 
@@ -50,7 +57,8 @@ function start(): void {
     const { status } = app;
     if (!status) return;
     if (!app.isConnected) {
-      doing.textContent = told.textContent = 'The connection was lost; what is seen is from before. Trying again … If the program has ended, start it again and open the address that it prints.';
+      doing.textContent = LOST[app.lost];
+      if (told.textContent !== doing.textContent) told.textContent = doing.textContent;
       return;
     }
     const left = status.is_done ? '' : remaining(status);
@@ -63,7 +71,7 @@ function start(): void {
   app.on('message', () => { message.textContent = app.message; });
   app.on('connection', () => {
     veil.hidden = app.isCaughtUp || (app.scene !== null && app.isConnected);
-    veil.firstElementChild!.textContent = app.scene && !app.isConnected ? 'The connection was lost. Trying again …' : 'Opening …';
+    veil.firstElementChild!.textContent = app.scene && !app.isConnected ? LOST[app.lost] : 'Opening …';
     document.body.classList.toggle('lost', !app.isConnected);
   });
 

@@ -1,9 +1,10 @@
 // What is measured: the picked point and its rays, a grid over a surface, or a working plane.
 import type { App } from './app';
 import { cover } from './cover';
+import { keepLaid, keptLaid } from './laid';
 import { follow, lay, open, read, type Grid } from './grid';
 import { Asker, BORDER, HEIGHT, type WorkingPlane } from './plane';
-import { corners, type Hit } from './stage';
+import { corners, type Hit, type Place } from './stage';
 import type { Surface } from './surface';
 import type { PlaneAnswer, ProbeAnswer, SurveyAnswer } from './wire';
 
@@ -23,6 +24,7 @@ export class Measuring {
   planeBorder = BORDER;
   private asker: Asker;
   private question = 0;
+  private hasBegun = false;
   /** Of which light was asked last. */
   private asked = '';
   /** Moves of things up to which it is known what covers the grid. */
@@ -57,8 +59,10 @@ export class Measuring {
     });
   }
 
-  /** All is there again after the connection was lost. */
+  /** All is there, for the first time or again after the connection was lost. */
   begin(): void {
+    if (!this.hasBegun) this.restore();
+    this.hasBegun = true;
     this.asker.begin();
   }
 
@@ -153,11 +157,38 @@ export class Measuring {
     if (!this.probed) return this.app.say('Pick a point of a surface first: the grid is laid over it.', this.whileProbed());
     this.plane = null;
     this.app.marks.plane(null);
-    this.grid = lay(this.probed.hit);
-    this.gridMoves = -1;
-    if (!this.grid) this.app.say('There is no plane surface to lay a grid over.', this.whileProbed());
-    this.readGrid();
+    if (!this.layGrid(this.probed.hit)) this.app.say('There is no plane surface to lay a grid over.', this.whileProbed());
     this.asker.begin();
+    this.app.tell('view');
+  }
+
+  /** Lays a grid where there is a plane surface; whether there is. */
+  private layGrid(place: Place): boolean {
+    this.grid = lay(place);
+    const isLaid = this.grid !== null;
+    this.gridMoves = -1;
+    this.keep();
+    this.readGrid();
+    return isLaid;
+  }
+
+  /** Keeps for this tab what is laid. */
+  private keep(): void {
+    const { grid, plane } = this;
+    if (grid) keepLaid({ object: grid.surface.object, ...grid.picked });
+    else if (plane) keepLaid({ object: plane.surface.object, triangle: plane.triangle, uv: plane.uv, plane: { height: plane.height, border: plane.border } });
+    else keepLaid(null);
+  }
+
+  /** Lays what was laid before the page was loaded anew, where that is still there. */
+  private restore(): void {
+    const laid = keptLaid();
+    const surface = laid && this.app.stage.surfaces.get(laid.object);
+    if (!surface?.visible || laid!.triangle * 3 >= surface.geometry.index!.count) return;
+    const { triangle, uv, plane } = laid!;
+    if (!plane) return void this.layGrid({ surface, triangle, uv });
+    [this.planeHeight, this.planeBorder] = [plane.height, plane.border];
+    this.plane = { surface, triangle, uv, ...plane, answer: null };
     this.app.tell('grid');
     this.app.tell('view');
   }
@@ -169,6 +200,7 @@ export class Measuring {
     this.app.say('');
     const { surface, triangle, uv } = this.probed.hit;
     this.plane = { surface, triangle, uv, height: this.planeHeight, border: this.planeBorder, answer: null };
+    this.keep();
     this.asker.begin();
     this.app.tell('grid');
   }
@@ -179,6 +211,7 @@ export class Measuring {
     if (this.plane) {
       // Numbers of the old plane would be taken for those of this one.
       Object.assign(this.plane, { height, border, answer: null });
+      this.keep();
       this.app.marks.plane(null);
       this.asker.begin();
     }
@@ -215,6 +248,7 @@ export class Measuring {
 
   clearGrid(): void {
     this.grid = this.plane = null;
+    this.keep();
     this.app.marks.grid(null);
     this.app.marks.plane(null);
     this.app.tell('grid');

@@ -14,17 +14,21 @@ import type { CameraPlace, CutsFrame, SceneNotice } from './wire';
 /** The colour of what is marked. */
 export const ACCENT = 0xe8b04a;
 
-/** Where a ray ended. */
-export interface Hit {
+/** A place of a surface. */
+export interface Place {
   surface: Surface;
+  triangle: number;
+  /** Weights of the triangle's corners 1 and 2. */
+  uv: [number, number];
+}
+
+/** Where a ray ended. */
+export interface Hit extends Place {
   /** In the world, whose zenith is +Y. */
   point: Vector3;
   /** Of the side that the ray came to. */
   normal: Vector3;
   distance: number;
-  triangle: number;
-  /** Weights of the triangle's corners 1 and 2. */
-  uv: [number, number];
 }
 
 /** Pixels drawn for one shown, along each side: fewer while something moves and frames take long. */

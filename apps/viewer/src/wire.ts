@@ -345,6 +345,9 @@ function* readLight(buffer: ArrayBuffer): Generator<LightFrame> {
   }
 }
 
+/** What is known of why there is no connection: nobody answers at the address; somebody does who knows it not; or nothing. */
+export type Lost = 'silent' | 'strange' | 'unknown';
+
 /** Who listens to a connection. */
 export interface Listener {
   notice(notice: Notice): void;
@@ -352,10 +355,14 @@ export interface Listener {
   cuts(frame: CutsFrame): void;
   light(frame: LightFrame): void;
   connected(is: boolean): void;
+  lost(why: Lost): void;
 }
 
 /** Milliseconds before a lost connection is tried again: first, and at most. */
 const PATIENCE = [250, 4000];
+
+/** Milliseconds within which whoever is there answers. */
+const ANSWERED = 3000;
 
 /** The socket, opened again when it closes. */
 export class Connection {
@@ -404,7 +411,9 @@ export class Connection {
     const socket = new WebSocket(address);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
+    let wasOpen = false;
     socket.onopen = () => {
+      wasOpen = true;
       this.patience = PATIENCE[0];
       this.listener.connected(true);
       this.look(this.layer);
@@ -412,9 +421,23 @@ export class Connection {
     socket.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => this.receive(data);
     socket.onclose = () => {
       this.listener.connected(false);
+      if (!wasOpen) void this.find();
       setTimeout(() => this.open(), this.patience);
       this.patience = Math.min(2 * this.patience, PATIENCE[1]);
     };
+  }
+
+  /** Finds out why there is no connection, which sockets do not tell: a program that was started anew at the same port has another
+   *  token, and refuses that of this page for ever. */
+  private async find(): Promise<void> {
+    let why: Lost = 'silent';
+    try {
+      const { status } = await fetch(location.href, { method: 'HEAD', cache: 'no-store', signal: AbortSignal.timeout(ANSWERED) });
+      why = status === 403 ? 'strange' : 'unknown';
+    } catch {
+      // Nobody is there, or nobody who answers in time.
+    }
+    if (!this.isOpen) this.listener.lost(why);
   }
 
   private receive(data: string | ArrayBuffer): void {

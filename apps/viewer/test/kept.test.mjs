@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { decoded, done, pixels, pixelsOf, state } from './program.mjs';
+import { caughtUp, decoded, done, pixels, pixelsOf, state } from './program.mjs';
 
 const { program, pages } = await started();
 
@@ -49,6 +49,41 @@ test('a view is kept, gone back to from elsewhere and on another page, and forgo
     assert.deepEqual(page.faults, []);
     await page.context().close();
   }
+});
+
+test('a grid and a working plane are there again when the page is loaded anew', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const again = async () => {
+    await page.reload();
+    await caughtUp(page);
+    const { grid, plane } = await state(page);
+    return { grid, plane };
+  };
+  await page.evaluate(() => window.radiosity.app.measuring.pick(0, -0.9));
+  await page.keyboard.press('g');
+  const { first, size, count, covered } = (await state(page)).grid;
+  const { grid } = await again();
+  assert.deepEqual([grid.first, grid.size, grid.count, grid.covered], [first, size, count, covered]);
+  await page.waitForFunction(() => window.radiosity.app.measuring.grid.answer?.is_done);
+  await page.evaluate(() => {
+    const { measuring } = window.radiosity.app;
+    measuring.pick(0, -0.9);
+    measuring.setPlane(0.1, 0.04);
+    measuring.measurePlane();
+    measuring.setPlane(0.2, 0.04);
+  });
+  const { plane } = await again();
+  assert.deepEqual([plane.height, plane.border], [0.2, 0.04]);
+  await page.waitForFunction(() => window.radiosity.state().plane.is_done);
+  assert.equal(await page.getByLabel('Height of the working plane').inputValue(), '0.2');
+  const kept = await page.evaluate(() => {
+    window.radiosity.app.measuring.clearGrid();
+    return [sessionStorage.getItem('radiosity.laid'), localStorage.getItem('radiosity.laid')];
+  });
+  assert.deepEqual(kept, [null, null]);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
 });
 
 test('a screenshot is the picture that is seen, with all pixels, and each is a file of its own', async () => {

@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { curves, shown } from './display.mjs';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, picture, pixels, pixelsOf, restored, state, stuck, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, picture, pixels, pixelsOf, restored, SMALL, state, stuck, view } from './program.mjs';
 import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
@@ -801,6 +801,23 @@ test('malformed messages are refused and nothing is lost', async () => {
   assert.deepEqual(await lux(), before);
   assert.equal((await state(page)).status.edits, edits);
   await page.context().close();
+});
+
+test('a page whose program has ended says so, and what to do when another was started at its port', async () => {
+  const first = await view(...SMALL);
+  const page = await pages.open(first.url);
+  const says = (what) => page.waitForFunction((what) => [...document.querySelectorAll('#doing, .veil:not([hidden]) p')].filter(({ textContent }) => textContent.includes(what)).length === 2, what);
+  assert.equal(await first.end(), 0);
+  await says('does not answer');
+  const second = await view('--port', new URL(first.url).port, ...SMALL);
+  await says('open the address that it printed');
+  await picture(page, 'ended');
+  // The address that it prints is another.
+  assert.notEqual(second.url, first.url);
+  await page.goto(second.url);
+  await caughtUp(page);
+  await page.context().close();
+  await second.end();
 });
 
 test('without the token, and from elsewhere, there is no page', async () => {

@@ -86,6 +86,7 @@ export async function browser() {
 
 /** Answers with `PAGE`, under the policy of the program. */
 async function instead(route) {
+  if (route.request().method() === 'HEAD') return route.continue();
   const response = await route.fetch();
   const [nonce] = /(?<=nonce-)[0-9a-f]+/.exec(response.headers()['content-security-policy']);
   await route.fulfill({ response, body: readFileSync(process.env.PAGE, 'utf8').replaceAll('nonce="NONCE"', `nonce="${nonce}"`) });
