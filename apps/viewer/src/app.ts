@@ -100,6 +100,11 @@ export class App {
         this.tell('connection');
       },
     });
+    // A picture as the eye sees it leaves the scale to a working plane.
+    this.exposure.coloured = () => {
+      const answer = this.falseColours || shared.isolines.value || isError(this.layer) ? null : this.measuring.plane?.answer;
+      return answer ? answer.points.map(([, , , lux]) => lux) : null;
+    };
     // Once for all that comes between two pictures, however many objects that are.
     this.on('selection', () => {
       this.marks.outline(this.group());

@@ -24,6 +24,8 @@ export class Exposure {
   range: [number, number] = [10, 1000];
   isRangeAutomatic = true;
   levels: number[] = [];
+  /** What alone has colours of the scale, lx, but for what is seen. */
+  coloured: () => number[] | null = () => null;
   /** What is shown is not light: eyes stay as they are. */
   isBlind = false;
   /** What the meter saw last, and from where. */
@@ -130,7 +132,7 @@ export class Exposure {
 
   /** Fits the scale to light that is seen, unless it was set. */
   private fit(illuminance: number[]): void {
-    const range = this.isRangeAutomatic ? rangeOf(illuminance) : null;
+    const range = this.isRangeAutomatic ? (rangeOf(this.coloured() ?? []) ?? rangeOf(illuminance)) : null;
     if (!range || (range[0] === this.range[0] && range[1] === this.range[1])) return;
     this.scale(range);
     this.changed();

@@ -17,7 +17,7 @@ export function legend(app: App): HTMLElement {
   app.on('view', () => {
     element.hidden = !isScaled(app);
     bar.hidden = !isColoured(app);
-    unit.textContent = unitOf(app.layer);
+    unit.textContent = `${isError(app.layer) ? 'noise, ' : ''}${unitOf(app.layer)}`;
     app.marks.colourPlane();
     marks.replaceChildren(...app.exposure.levels.map((level) => el('span', { style: `bottom:${100 * share(app, level)}%` }, readable(level))));
   });

@@ -226,6 +226,7 @@ export class Measuring {
       return this.app.say(why ?? '', this.whileProbed());
     }
     this.plane.answer = answer;
+    this.app.exposure.meter();
     this.app.marks.plane(answer);
     this.app.tell('grid');
     this.app.tell('view');

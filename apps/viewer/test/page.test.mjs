@@ -233,6 +233,11 @@ test('a working plane lies in the air of the room, as `measure` has it, and foll
   assert.match(await page.locator('#grid .facts').innerText(), new RegExp(`Points\\s*${lux.length}`));
   assert.ok((await page.locator('.numbers-over span:visible').count()) > 3, 'numbers on the picture');
   assert.equal(await page.locator('#legend').isVisible(), true);
+  // It alone has colours, and the scale is for it.
+  await page.waitForFunction(([low, high]) => {
+    const [from, to] = window.radiosity.app.exposure.range;
+    return from <= low && to >= 0.9 * high && from > low / 2 && to < 2 * high;
+  }, [Math.min(...lux), Math.max(...lux)]);
   await picture(page, 'plane');
 
   // At another height nothing of it stays; back there it is the same again.
@@ -911,7 +916,7 @@ test('the error of what is in sight is told, and that of each place in percent o
     return (await state(page)).inSight;
   };
   const all = await told();
-  assert.match(await page.locator('#in-sight').textContent(), /^in sight ± [0-9.]+ %$/);
+  assert.match(await page.locator('#in-sight').textContent(), /^picture ± [0-9.]+ %$/);
   // From near a wall, nothing but that wall.
   const near = async (from, way) => {
     await page.evaluate(([from, way]) => {
@@ -948,7 +953,7 @@ test('the error of what is in sight is told, and that of each place in percent o
   const noise = await shown();
   const mean = noise.lux.reduce((sum, x) => sum + x, 0) / noise.lux.length;
   assert.ok(mean > 0.1 && mean < 30, `${mean} % on the map`);
-  assert.equal(await page.locator('#legend .unit').textContent(), '%');
+  assert.equal(await page.locator('#legend .unit').textContent(), 'noise, %');
   await picture(page, 'error');
   assert.deepEqual(page.faults, []);
   await page.context().close();

@@ -8,9 +8,9 @@ import { button, choice, el } from './parts';
 export function bar(app: App, { help, fold }: { help(): void; fold(): void }): HTMLElement {
   const title = el('b', { class: 'scene' });
   const progress = el('i', { class: 'progress', role: 'progressbar', 'aria-label': 'Solution', 'aria-valuemin': 0, 'aria-valuemax': 100 });
-  const sight = el('span', { id: 'in-sight', title: 'How far the picture is off in sight, edges of shadows and all: measured at 160 places with rays of their own, over the light there, root mean square; smaller elements make it less (--elements). The light meter and grids measure at their own points and are as exact as those' });
+  const sight = el('span', { id: 'in-sight', title: 'How far the picture is off where one looks, edges of shadows and all: measured at 160 places with rays of their own, over the light there, root mean square; smaller elements make it less (--elements). The light meter and grids measure at their own points and are as exact as those' });
   const error = el('span', { class: 'wide', id: 'error', title: 'Noise of the rays of all light together (L2); that elements have a size is not in it' });
-  const rays = el('span', { class: 'wide', id: 'rays' });
+  const rays = el('span', { class: 'wide', id: 'rays', title: 'Rays that each element of the surfaces has sent, of those that it will send (--rays)' });
   const left = el('span', { class: 'wide', id: 'left' });
   const mode = choice('How to move', [['walk', 'Walk', 'V'], ['orbit', 'Orbit', 'V']], (value) => app.walk(value));
   const undo = button('↶', () => app.undo(), { key: 'Ctrl+Z', title: 'Undo', kind: 'icon' });
@@ -19,7 +19,8 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
   redo.setAttribute('aria-label', 'Redo');
   const menu = el('div', { class: 'menu', id: 'saves', role: 'menu', 'aria-labelledby': 'save', hidden: true },
     el('button', { type: 'button', role: 'menuitem', tabindex: -1, click: () => { screenshot(app); open(false); } }, 'Screenshot', el('span', { class: 'quiet' }, '.png')),
-    download(app, 'Lit model', 'lit.glb', () => open(false)), download(app, 'Edited scene', 'scene.glb', () => open(false)));
+    download(app, 'Lit model', 'lit.glb', 'Surfaces with the light at their vertices (_IRRADIANCE, lx), for other programs', () => open(false)),
+    download(app, 'Edited scene', 'scene.glb', 'The scene as it is now, with its lamps, to be opened and lit again; a sky is not in it', () => open(false)));
   const save = button('Save', () => open(menu.hidden !== false), { title: 'Screenshot, lit model, edited scene' });
   save.id = 'save';
   save.setAttribute('aria-haspopup', 'menu');
@@ -68,7 +69,7 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     redo.title = app.redoable ? `Redo: ${app.redoable} (Ctrl+Y)` : 'Nothing to redo';
   });
   app.on('sight', () => {
-    sight.textContent = app.sight.error === null ? '' : `in sight ± ${percent(app.sight.error)}`;
+    sight.textContent = app.sight.error === null ? '' : `picture ± ${percent(app.sight.error)}`;
   });
   app.on('status', () => {
     const { status } = app;
@@ -96,8 +97,9 @@ export function bar(app: App, { help, fold }: { help(): void; fold(): void }): H
     panel);
 }
 
+/** An error in percent: two digits of it are known. */
 export function percent(share: number): string {
-  return `${readable(100 * share)} %`;
+  return `${readable(Number((100 * share).toPrecision(2)))} %`;
 }
 
 /** How long it will take to where that is known: edges of shadows come after all rays. */
@@ -112,12 +114,12 @@ export function duration(seconds: number): string {
 }
 
 /** A file that the program makes. */
-function download(app: App, label: string, file: string, close: () => void): HTMLElement {
+function download(app: App, label: string, file: string, title: string, close: () => void): HTMLElement {
   const click = (event: Event) => {
     close();
     if (app.isConnected) return app.say(`${label}: the program makes the file; the browser says when it is there.`);
     event.preventDefault();
     app.refuse(`${label}: nothing was saved, as the connection to the program was lost.`);
   };
-  return el('a', { role: 'menuitem', tabindex: -1, href: file, download: '', click }, label, el('span', { class: 'quiet' }, file.slice(file.indexOf('.'))));
+  return el('a', { role: 'menuitem', tabindex: -1, href: file, download: '', title, click }, label, el('span', { class: 'quiet' }, file.slice(file.indexOf('.'))));
 }

@@ -1,5 +1,5 @@
 // What is measured: at a point, and on a grid.
-import type { App } from '../app';
+import { isError, type App } from '../app';
 import { savePoints } from '../files';
 import { open } from '../grid';
 import { luminance } from '../luminance';
@@ -29,7 +29,7 @@ export function meterPanel(app: App): HTMLElement {
     lux.replaceChildren(readable(answer.illuminance), el('span', { class: 'unit' }, 'lx'));
     const point = app.stage.toScene(probed.hit.point);
     facts.replaceChildren(
-      fact('Noise', `± ${readable(answer.error)} lx`),
+      fact('Noise', `± ${readable(Number(answer.error.toPrecision(2)))} lx`),
       fact('Reflectance', el('span', {}, el('i', { class: 'swatch', style: `background:${hex(answer.reflectance)}` }), `${(100 * luminance(answer.reflectance)).toFixed(1)} %`)),
       fact('Radiosity', `${readable(luminance(answer.radiosity))} lm/m²`),
       fact('Luminance', `${readable(luminance(answer.radiosity) / Math.PI)} cd/m²`),
@@ -103,7 +103,7 @@ export function gridPanel(app: App): HTMLElement {
       fact('Mean', `${readable(mean)} ${unit}`),
       fact('Least', `${readable(least)} ${unit}`),
       fact('Most', `${readable(largest)} ${unit}`),
-      fact('Uniformity', uniformity.toFixed(2)),
+      ...(grid && isError(app.layer) ? [] : [fact('Uniformity', uniformity.toFixed(2))]),
       fact('Points', String(grid ? points.length - covered : points.length)),
       ...(covered > 0 ? [fact('Covered, left out', String(covered))] : []),
       ...(answer?.walled ? [fact('Along walls and what is high or fixed, left out', String(answer.walled))] : []),
