@@ -8,15 +8,18 @@ mod furnace;
 mod furnished;
 #[path = "common/room.rs"]
 mod room;
+#[path = "common/small.rs"]
+mod small;
 
 use finish::finish;
 use furnace::furnace;
-use furnished::{furnished, small};
+use furnished::furnished;
 use radiosity::session::{
     Edit, Form, Layer, LightId, LightKind, NewObject, ObjectId, Session, SessionOptions, SurfacePlace,
 };
 use radiosity::{Bands, Mesh, Side, Solution, SolveOptions, Tracer, cornell_box, luminance};
 use room::{Furnishing, room};
+use small::small;
 use std::time::Duration;
 
 fn at(object: ObjectId, triangle: u32) -> SurfacePlace {
