@@ -88,7 +88,7 @@ fn node(builder: &mut Builder, lamp: &PointLight, (name, own): (&str, Value)) ->
 }
 
 /// Removes an extension from an object, and `extensions` where it was the last.
-fn remove(json: &mut Map<String, Value>, name: &str) -> Option<Value> {
+pub(super) fn remove(json: &mut Map<String, Value>, name: &str) -> Option<Value> {
     let extensions = json.get_mut("extensions")?.as_object_mut()?;
     let own = extensions.remove(name);
     if extensions.is_empty() {

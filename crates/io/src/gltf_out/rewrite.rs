@@ -44,6 +44,7 @@ pub(super) fn rewrite(
 ) -> Result<Vec<u8>, WriteError> {
     let mut builder = Builder { json: document.json.as_object().cloned().unwrap_or_default(), binary: Vec::new() };
     unpack(&mut builder);
+    forget_light(&mut builder);
     let old_views = list(&document.json, "bufferViews").len();
     let mut materials = Materials::new(scene, style, &mut builder);
 
@@ -216,6 +217,15 @@ fn unpack(builder: &mut Builder) {
             parts.iter_mut().for_each(remove_extensions);
         }
     }
+}
+
+/// Takes the lightmap out with which a model was lit before: beside other light it would be shown, too. Light at vertices is not copied
+/// ([`vertices`]).
+fn forget_light(builder: &mut Builder) {
+    for material in builder.list("materials").iter_mut().filter_map(Value::as_object_mut) {
+        lamps::remove(material, "MOZ_lightmap");
+    }
+    builder.list("extensionsUsed").retain(|name| name != "MOZ_lightmap");
 }
 
 /// An instance of EXT_mesh_gpu_instancing.

@@ -282,6 +282,28 @@ fn a_lightmap_goes_onto_the_material_in_the_next_free_set() {
     assert!(json["materials"][2]["extensions"]["MOZ_lightmap"].is_object());
 }
 
+/// A model that was lit with a lightmap and then at its vertices showed both.
+#[test]
+fn a_model_that_is_lit_again_has_the_new_light_alone() {
+    let lit = |before: &crate::Loaded, style: &Style| {
+        let (scene, document) = (&before.scene, before.document.as_ref());
+        let lit = match style {
+            Style::Lightmap { .. } => halved(scene, on_page),
+            _ => halved(scene, at_vertices),
+        };
+        load(&lit_glb(scene, document, &lit, style).unwrap())
+    };
+    let has = |loaded: &crate::Loaded| {
+        let json = loaded.document.as_ref().unwrap().json.to_string();
+        ["MOZ_lightmap", "_IRRADIANCE"].map(|name| json.contains(name))
+    };
+    let map = Style::Lightmap { pages: pages(), encoding: Encoding::Linear, exposure: 0.5 };
+    let first = lit(&load(source().to_string().as_bytes()), &map);
+    let second = lit(&first, &Style::Vertices);
+    let third = lit(&second, &map);
+    assert_eq!([&first, &second, &third].map(has), [[true, false], [false, true], [true, false]]);
+}
+
 #[test]
 fn both_sides_of_a_surface_become_two_single_sided_layers() {
     let mut json = source();

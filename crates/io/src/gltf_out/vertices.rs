@@ -84,8 +84,8 @@ pub(super) fn from_source(
     let own = source.get("attributes").and_then(Value::as_object).unwrap_or(&empty);
     for (name, accessor) in own {
         let Some(index) = whole(accessor) else { continue };
-        // Skins are interpolated as a whole, below.
-        if name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_") {
+        // Skins are interpolated as a whole, below; light of before is no more.
+        if name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_") || name == "_IRRADIANCE" {
             continue;
         }
         let written = attribute(builder, document, index, lit, name, false);
