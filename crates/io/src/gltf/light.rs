@@ -21,7 +21,9 @@ pub(crate) fn lights(
     let mut put_aside = 0;
     for at in placed {
         let Some(node) = list(&document.json, "nodes").get(at.node) else { continue };
-        let aside = node.pointer("/extras/KHR_lights_punctual").filter(|own| !text(own, "type").is_empty());
+        // Extras are anybody's: what looks otherwise is no lamp of ours, and no fault.
+        let is_lamp = |own: &&Value| ["point", "spot", "directional"].contains(&text(own, "type"));
+        let aside = node.pointer("/extras/KHR_lights_punctual").filter(is_lamp);
         let (json, place) = match (node.pointer("/extensions/KHR_lights_punctual/light"), aside) {
             (Some(index), _) => {
                 let Some(json) = whole(index).and_then(|index| all.get(index)) else {
@@ -155,7 +157,7 @@ mod tests {
                 {"extensions": light(1), "rotation": [-half, 0, 0, half]},
                 {"extensions": light(2)}, {"extensions": light(7)},
                 {"extras": {"KHR_lights_punctual": {"type": "point", "intensity": 3}}, "translation": [0, 1, 0], "name": "aside"},
-                {"extras": {"KHR_lights_punctual": "a remark"}},
+                {"extras": {"KHR_lights_punctual": "a remark"}}, {"extras": {"KHR_lights_punctual": {"type": "maser"}}},
                 {"camera": 0, "translation": [0, 0, 5], "scale": [2, 2, 2], "name": "eye"}, {"camera": 1}]});
         let document = Document { json, ..Document::default() };
         let mut faults = Faults::default();
@@ -168,7 +170,7 @@ mod tests {
         assert_eq!((lights[0].position, lights[0].intensity), (DVec3::new(1.0, 2.0, 3.0), [10.0, 5.0, 0.0]));
         assert!((lights[1].direction + DVec3::Y).length() < 1e-12, "{}", lights[1].direction);
         let text = faults.to_string();
-        assert!(text.contains("type 'laser'") && text.contains("light 7 of 3"), "{text}");
+        assert!(text.contains("type 'laser'") && text.contains("light 7 of 3") && !text.contains("maser"), "{text}");
 
         let cameras = cameras(&document, &placed, "t", &mut faults);
         assert_eq!((cameras[0].name.as_str(), cameras[0].aspect), ("eye", Some(2.0)));
