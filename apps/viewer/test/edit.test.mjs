@@ -867,6 +867,7 @@ test('a lamp of the file becomes another kind, brighter and narrower by keyboard
   const made = await light('bulb');
   assert.deepEqual(made.cone.map((angle) => Math.round((1e6 * angle * 180) / Math.PI) / 1e6), [10, 60]);
   assert.ok(Math.abs(made.intensity[1] * solid(made.cone) - 500) < 0.01, `${made.intensity}`);
+  assert.equal(await page.getByLabel('Luminous flux of bulb, lumens').inputValue(), '500', 'in the list of lights, too');
   assert.deepEqual([made.position, made.dimming], [named('bulb').position, 1], 'where it was');
   await page.locator('#thing').scrollIntoViewIfNeeded();
   await picture(page, 'lamp-changed');

@@ -1,6 +1,6 @@
 // Lights: on and off, dimming, colour, and new ones.
 import type { App } from '../app';
-import { LAMPS, type LampKind } from '../lamps';
+import { LAMPS, type LampKind, solidAngle } from '../lamps';
 import { luminance } from '../luminance';
 import { readable } from '../scale';
 import type { LightNotice } from '../wire';
@@ -67,7 +67,7 @@ function row(app: App, id: number): Row {
     const dimming = Math.min(MOST_DIMMING, Math.max(0, wanted));
     app.setLight(light(), { dimming }, gesture);
     const most = MOST_DIMMING * undimmed(light());
-    if (wanted > dimming) app.refuse(`At most ${MOST_DIMMING} times what the lamp gives before it is dimmed${most > 0 ? `: ${readable(most)} ${unit}` : ''}.`);
+    if (wanted > dimming) app.refuse(`At most ${MOST_DIMMING} times what the lamp gives before it is dimmed${most > 0 ? `: ${readable(most)} ${measureOf(light())[1]}` : ''}.`);
     if (wanted < dimming) app.refuse('There is no light below 0: it is off.');
     return 100 * dimming;
   };
@@ -76,19 +76,16 @@ function row(app: App, id: number): Row {
     change: () => app.setLight(light(), { dimming: on.checked ? last || 1 : 0 }),
   });
   const dimming = slider(`Dimming of ${name}`, { min: 0, max: 200, step: 1, unit: '%' }, (value, isLast) => dim(value / 100, during(isLast)));
-  // Daylight is known by its lux, and what shines by its lumens.
-  const [what, unit] = { sky: ['On open ground', 'lx'], object: ['All its light', 'lm'] }[light().type as string] ?? ['Across its rays', 'lx'];
   const amount = el('input', {
-    type: 'number', min: 0, step: 'any', 'aria-label': unit === 'lm' ? `Luminous flux of ${name}, lumens` : `Illuminance by ${name}, lux`,
+    type: 'number', min: 0, step: 'any',
     change: () => {
       dim(amount.valueAsNumber / undimmed(light()));
       // What is too much is as much as there can be.
       app.tell('lights');
     },
   });
-  const absolute = el('label', { class: 'slider' },
-    el('span', { class: 'quiet grow' }, what),
-    el('span', { class: 'number' }, amount, el('span', { class: 'unit' }, unit)));
+  const [what, unit] = [el('span', { class: 'quiet grow' }), el('span', { class: 'unit' })];
+  const absolute = el('label', { class: 'slider' }, what, el('span', { class: 'number' }, amount, unit));
   const colour = el('input', {
     type: 'color', 'aria-label': `Colour of ${name}, relative to its own`, title: 'Colour, relative to its own; its light in lumens stays',
     input: () => app.setLight(light(), { colour: filter(colour.value) }, during(false)),
@@ -110,6 +107,9 @@ function row(app: App, id: number): Row {
       element.hidden = now.deleted;
       element.classList.toggle('off', now.dimming === 0);
       dimming.set(100 * now.dimming);
+      // A lamp may have become one of another kind.
+      [what.textContent, unit.textContent] = measureOf(now);
+      amount.setAttribute('aria-label', unit.textContent === 'lm' ? `Luminous flux of ${name}, lumens` : `Illuminance by ${name}, lux`);
       // What gives no light at all cannot be turned up.
       absolute.hidden = undimmed(now) <= 0;
       amount.max = String(MOST_DIMMING * undimmed(now));
@@ -123,9 +123,15 @@ function row(app: App, id: number): Row {
 /** As far as lights can be turned up. */
 const MOST_DIMMING = 100;
 
-/** Lux by daylight or lumens of what shines in its colour as it is now, before it is dimmed; 0 of other lights. */
-function undimmed({ illuminance, flux, colour }: LightNotice): number {
-  const own = illuminance ?? flux;
+/** Daylight is known by its lux, and what shines by its lumens. */
+function measureOf({ type }: LightNotice): [string, string] {
+  if (type === 'sky') return ['On open ground', 'lx'];
+  return type === 'directional' ? ['Across its rays', 'lx'] : ['All its light', 'lm'];
+}
+
+/** Lux by daylight or lumens of what shines in its colour as it is now, before it is dimmed. */
+function undimmed({ illuminance, flux, intensity, cone, colour }: LightNotice): number {
+  const own = illuminance ?? flux ?? intensity?.map((band) => band * solidAngle(cone));
   return own ? luminance(own.map((band, k) => band * colour[k])) : 0;
 }
 
