@@ -121,7 +121,7 @@ impl Live {
             places.iter().for_each(|place| add(self.direct(column, &site(*place), 0, 1)[0]));
             return (sum.map(|x| x as f32), 0);
         }
-        let (sequence, share) = (column.sequence(0), (spots.len() / places.len().max(1)).max(1));
+        let (draws, share) = (column.draws(0), (spots.len() / places.len().max(1)).max(1));
         let is_near = places.first().is_some_and(|(point, _)| {
             let point = *point - self.world.middle;
             spots.iter().any(|spot| spot.is_near(point))
@@ -136,7 +136,7 @@ impl Live {
             let (site, is_clear) = (site(*place), is_known && hidden == 0);
             for spot in own {
                 let sample = if is_near {
-                    column.sample(&self.world, &site, (0, &sequence), spot.index)
+                    column.sample(&self.world, &site, &draws, spot.index)
                 } else {
                     spot.seen_from(&self.world, &site.place(0.0, 0.0))
                 };
@@ -159,12 +159,12 @@ impl Live {
             return halves;
         }
         let world = &self.world;
-        let sequence = column.sequence(seed);
+        let draws = column.draws(seed);
         // Each ray to one light without area is the same.
         let rays = if column.is_certain() { 1 } else { rays };
         let shares = shares(rays);
         for index in 0..rays {
-            let Some(sample) = column.sample(world, site, (seed, &sequence), index) else { continue };
+            let Some(sample) = column.sample(world, site, &draws, index) else { continue };
             if world.blocked(&sample.ray, sample.salt) {
                 continue;
             }

@@ -3,6 +3,7 @@
 //! What is in the world follows from the file's triangles and the matrix alone, so that an object that comes back to a
 //! place has the same bits there.
 
+use crate::gather::near;
 use glam::{DAffine3, DVec2, DVec3};
 use radiosity_scene::elements::{corners, division_of, locate, places_over, triangle_from_square};
 use radiosity_scene::{AlphaMode, Bands, Scene, Side, Surface};
@@ -140,6 +141,11 @@ impl Site {
     /// A point in the air with a unit normal.
     pub fn in_the_air(point: DVec3, normal: DVec3) -> Site {
         Site { origin: point, edges: [DVec3::ZERO; 2], normal, centre: point, radius: 0.0, triangle: u32::MAX }
+    }
+
+    /// The distance below which what looks at it sees more than its mean, metres.
+    pub fn near(&self) -> f64 {
+        near(0.5 * self.edges[0].cross(self.edges[1]).length())
     }
 
     /// The place that (x, y) in the unit square maps to.

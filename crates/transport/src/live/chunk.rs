@@ -7,6 +7,7 @@
 //! was may have come free, free ones that pass through the box where it is may be stopped.
 
 mod dirt;
+mod kept;
 mod shadows;
 
 pub use dirt::{Change, Dirt};
@@ -17,7 +18,6 @@ use super::column::Column;
 use super::world::{Met, World};
 use glam::DVec3;
 use radiosity_scene::Bands;
-use radiosity_scene::elements::triangle_from_square;
 use radiosity_trace::Ray;
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
 use shadows::Shadows;
@@ -35,16 +35,6 @@ pub const NEAR_SHADOWS: u32 = 4;
 
 /// The stream of sample points that rows use.
 pub const ROWS: u32 = 0x0100;
-
-/// Rays next to one that tell whether it starts inside a solid. More blur the outline of what is buried, fewer take
-/// chance for it.
-const NEIGHBOURS: usize = 4;
-
-/// Rays that are looked at together for these: mostly there is none among them.
-const AT_ONCE: usize = 16;
-
-/// Elements of which less than this part is exposed get no light.
-const LEAST_OPEN: f32 = 1.0 / 16.0;
 
 /// Which of the rays are worked on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,17 +87,54 @@ pub struct Chunk {
     room: [usize; 2],
     ids: [Vec<u32>; 2],
     keys: [Vec<f32>; 2],
+    /// Words of bits for the rays of a row.
+    words: usize,
+    /// Which rays of each row count, as far as they have been traced.
+    kept: Vec<u64>,
     /// One over the rays that count, of the first part and of all, by element.
     scale: [Vec<f32>; 2],
-    /// One over the part of each element that is exposed; zero where next to nothing is.
-    open: Vec<f32>,
+    /// The part of each element that is exposed; zero where next to nothing is.
+    exposed: Vec<f32>,
     /// Entries of each row that met black backs.
     dark: Vec<u16>,
-    /// Whether only the first part of a row has said how much of the element is exposed.
+    /// Whether only the first part of a row has said which of its rays count.
     is_rough: Vec<bool>,
     shadows: Vec<Shadows>,
     /// Changes that have been looked at, for the first part and the rest.
     seen: [usize; 2],
+}
+
+/// Entries of a row.
+pub struct Row<'a> {
+    /// What each met, in two parts.
+    pub ids: [&'a [u32]; 2],
+    /// Which of them count.
+    pub kept: &'a [u64],
+    /// What each that counts weighs.
+    pub share: f32,
+}
+
+impl Row<'_> {
+    /// How many entries there are.
+    pub fn len(&self) -> usize {
+        self.ids[0].len() + self.ids[1].len()
+    }
+
+    /// Whether all entries count.
+    #[inline(always)]
+    pub fn is_whole(&self) -> bool {
+        self.kept.iter().all(|bits| *bits == u64::MAX)
+    }
+
+    /// Numbers and ids of the entries that count.
+    #[inline(always)]
+    pub fn counting(&self) -> impl Iterator<Item = (u32, u32)> {
+        let words = self.ids[0].chunks(64).chain(self.ids[1].chunks(64)).zip(self.kept).enumerate();
+        words.flat_map(|(word, (ids, kept))| {
+            let there = u64::MAX >> (64 - ids.len());
+            ones(kept & there).map(move |bit| (64 * word as u32 + bit, ids[bit as usize]))
+        })
+    }
 }
 
 /// What all chunks need to work.
@@ -158,8 +185,10 @@ impl Chunk {
             room,
             ids: [vec![0; n * near as usize], Vec::new()],
             keys: [vec![0.0; n * near as usize], Vec::new()],
+            words: (stride as usize).div_ceil(64),
+            kept: vec![u64::MAX; n * (stride as usize).div_ceil(64)],
             scale: [vec![0.0; n], vec![0.0; n]],
-            open: vec![0.0; n],
+            exposed: vec![0.0; n],
             dark: vec![0; n],
             is_rough: vec![false; n],
             shadows: Vec::new(),
@@ -182,6 +211,7 @@ impl Chunk {
     /// Bytes of an element with rows of `rays` rays and so many columns.
     pub fn bytes(rays: u32, columns: usize) -> usize {
         rays as usize * (size_of::<u32>() + size_of::<f32>())
+            + rays.div_ceil(64) as usize * size_of::<u64>()
             + columns * (size_of::<u64>() + size_of::<Bands>())
             + 3 * size_of::<f32>()
             + size_of::<u16>()
@@ -268,6 +298,8 @@ impl Chunk {
             Part::Far => NEAR_RAYS.min(self.traced)..self.traced,
         };
         let seen = self.seen[part as usize];
+        // Elements whose shadow rays count by other places than before, a bit for each.
+        let mut replaced = 0u64;
         if seen < work.changes.len() {
             let own;
             let dirt = match work.dirt.iter().find(|(of, _)| *of == seen) {
@@ -282,12 +314,12 @@ impl Chunk {
                     let (traced, has_changed) = self.mend_row(work, dirt, e, known.clone());
                     rays += traced;
                     if has_changed || self.is_rough[e] && part == Part::Far {
-                        self.weigh(work, part, e);
+                        replaced |= u64::from(self.weigh(work, part, e)) << e;
                     }
                 }
             }
             for column in 0..self.shadows.len() {
-                rays += self.mend_shadows(work, part, dirt, column);
+                rays += self.mend_shadows(work, part, (dirt, replaced), column);
             }
         }
         self.seen[part as usize] = work.changes.len();
@@ -295,7 +327,8 @@ impl Chunk {
             // There is no rest yet that could be dirty.
             self.seen[1] = self.seen[1].max(self.seen[0]).min(work.changes.len());
         }
-        if self.traced < target.rays {
+        let has_more_rays = self.traced < target.rays;
+        if has_more_rays {
             rays += u64::from(target.rays - self.traced) * self.len as u64;
             if target.rays > NEAR_RAYS {
                 self.ids[1].resize(self.len * self.room[1], 0);
@@ -305,11 +338,13 @@ impl Chunk {
                 self.trace_row(work, e, self.traced..target.rays);
             }
             self.traced = target.rays;
-            (0..self.len).for_each(|e| self.weigh(work, Part::Far, e));
+            replaced = (0..self.len).fold(0, |bits, e| bits | u64::from(self.weigh(work, Part::Far, e)) << e);
         }
         for column in 0..self.shadows.len() {
             if self.shadows[column].rays < target.shadows {
                 rays += self.trace_shadows(work, column, target.shadows);
+            } else if has_more_rays {
+                self.add_up(work, column, replaced);
             }
         }
         rays
@@ -332,43 +367,18 @@ impl Chunk {
         }
     }
 
-    /// Works out what rays of a row count, after some of a part were traced.
-    fn weigh(&mut self, work: &Work, part: Part, e: usize) {
-        let (rays, near) = (self.traced as usize, self.traced.min(NEAR_RAYS) as usize);
-        self.is_rough[e] = false;
-        if self.dark[e] == 0 {
-            self.scale[0][e] = 1.0 / near as f32;
-            self.scale[1][e] = 1.0 / rays as f32;
-            self.open[e] = 1.0;
-            return;
-        }
-        let (_, seed) = self.site(work.world, e);
-        let sequence = Sequence::new(seed, ROWS);
-        let row = self.parts(e, rays).concat();
-        let of = |n: usize| {
-            let (kept, open) = exposed(&row[..n], &sequence, work.is_dark);
-            if open >= LEAST_OPEN { (1.0 / kept as f32, 1.0 / open) } else { (0.0, 0.0) }
-        };
-        let first = of(near);
-        if part == Part::Near && rays > near {
-            // All of them would take sixteen times as long, and are not all there.
-            (self.scale[0][e], self.open[e], self.is_rough[e]) = (first.0, first.1, true);
-            return;
-        }
-        let all = if rays > near { of(rays) } else { first };
-        (self.scale[0][e], self.scale[1][e], self.open[e]) = (first.0, all.0, all.1);
-    }
-
-    /// Sets an entry; answers whether it met a black back and does not any more, or the other way round.
-    fn set(&mut self, work: &Work, e: usize, (part, at): (usize, usize), (key, id): (f32, u32)) -> bool {
+    /// Sets an entry; answers whether it met a black back and does not any more, or the other way round, and for the first entries
+    /// whether it met what is nearer than `limit`.
+    fn set(&mut self, work: &Work, e: usize, (part, at): (usize, usize), (key, id): (f32, u32), limit: f32) -> bool {
         let [was, is] = [self.ids[part][at], id].map(|id| work.is_dark[id as usize]);
-        (self.keys[part][at], self.ids[part][at]) = (key, id);
+        let before = std::mem::replace(&mut self.keys[part][at], key);
+        self.ids[part][at] = id;
         self.dark[e] = self.dark[e] + u16::from(is) - u16::from(was);
-        was != is
+        was != is || part == 0 && (before < limit) != (key < limit)
     }
 
     /// Traces the entries of a row that changes have dirtied; `known` are those of the part that have been traced. Answers how many
-    /// rays that took, and whether other entries met black backs before.
+    /// rays that took, and whether other rays may count than before.
     fn mend_row(&mut self, work: &Work, dirt: &Dirt, e: usize, known: std::ops::Range<u32>) -> (u64, bool) {
         let lost = self.find_lost(dirt, e, &known);
         let cones = dirt.cones(&self.sites[e]);
@@ -377,14 +387,15 @@ impl Chunk {
         }
         let world = work.world;
         let (site, seed) = self.site(world, e);
-        let (sequence, frame) = (Sequence::new(seed, ROWS), frame(site.normal));
+        let (sequence, frame, limit) = (Sequence::new(seed, ROWS), frame(site.normal), site.near() as f32);
         let (mut rays, mut has_changed) = (0, false);
         for (word, bits) in lost.into_iter().enumerate() {
             for bit in ones(bits) {
                 rays += 1;
                 let m = known.start + 64 * word as u32 + bit;
                 let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
-                has_changed |= self.set(work, e, self.at(e, m), entry(world, world.first(&ray, salt), direction));
+                let found = entry(world, world.first(&ray, salt), direction);
+                has_changed |= self.set(work, e, self.at(e, m), found, limit);
             }
         }
         let margin = world.margin();
@@ -424,7 +435,7 @@ impl Chunk {
                     }
                 }
                 if let Some(best) = best {
-                    has_changed |= self.set(work, e, at, best);
+                    has_changed |= self.set(work, e, at, best, limit);
                 }
             }
         }
@@ -451,18 +462,18 @@ impl Chunk {
 
     /// Whether next to nothing of an element is exposed, so that it gets no light.
     pub fn is_buried(&self, e: usize) -> bool {
-        self.open[e] == 0.0
+        self.exposed[e] == 0.0
     }
 
     /// The part of an element that is exposed, 0 to 1.
     pub fn exposed(&self, e: usize) -> f32 {
-        if self.is_buried(e) { 0.0 } else { 1.0 / self.open[e] }
+        self.exposed[e]
     }
 
     /// What a column brings directly to an element, lux per band.
     #[inline]
     pub fn light(&self, column: usize, e: usize) -> Bands {
-        self.shadows[column].light[e].map(|x| x * self.open[e])
+        if self.is_buried(e) { [0.0; 3] } else { self.shadows[column].light[e] }
     }
 
     /// The share of the shadow rays from an element to a column that came through.
@@ -470,14 +481,15 @@ impl Chunk {
         self.shadows[column].clear_share(e)
     }
 
-    /// The ids of the first `rays` entries of a row, in two parts, and what each entry weighs; of fewer entries where an edit has left
-    /// only as many. Of fewer than there are in the first part as many are taken to count as in all of it.
+    /// The first `rays` entries of a row; fewer where an edit has left only as many. Of fewer than there are in the first part as many are
+    /// taken to count as in all of it.
     #[inline(always)]
-    pub fn row(&self, e: usize, rays: usize) -> ([&[u32]; 2], f32) {
+    pub fn row(&self, e: usize, rays: usize) -> Row<'_> {
         let rays = rays.min(self.traced as usize);
         let (part, near) = (usize::from(rays > NEAR_RAYS as usize), self.traced.min(NEAR_RAYS) as usize);
         let share = self.scale[part][e];
-        (self.parts(e, rays), if rays < near { share * (near as f32 / rays as f32) } else { share })
+        let share = if rays < near { share * (near as f32 / rays as f32) } else { share };
+        Row { ids: self.parts(e, rays), kept: &self.kept[e * self.words..][..self.words], share }
     }
 
     #[inline(always)]
@@ -538,52 +550,4 @@ fn shoot_to(world: &World, site: &Site, (sequence, seed): (&Sequence, u32), dire
 #[inline]
 fn salt_of(seed: u32, m: u32) -> u32 {
     hash(hash(seed) ^ m)
-}
-
-/// How many rays of a row start from the exposed part of the element, and how large that part is. A ray that meets a black
-/// back counts as one that starts inside a solid where half of those that start next to it do so too: nobody sees that
-/// place. Elsewhere backs are black.
-fn exposed(row: &[u32], sequence: &Sequence, is_dark: &[bool]) -> (u32, f32) {
-    let is_dark: SmallVec<[bool; 256]> = row.iter().map(|id| is_dark[*id as usize]).collect();
-    let of = |axis: usize| -> SmallVec<[f32; 256]> {
-        let place = |m: u32| {
-            let [_, _, x, y] = sequence.point(m);
-            triangle_from_square(f64::from(x), f64::from(y))
-        };
-        (0..row.len() as u32).map(|m| if axis == 0 { place(m).0 } else { place(m).1 } as f32).collect()
-    };
-    let (us, vs) = (of(0), of(1));
-    let mut squares: SmallVec<[f32; 256]> = SmallVec::from_elem(0.0, row.len());
-    let mut buried = 0;
-    for m in (0..row.len()).filter(|m| is_dark[*m]) {
-        for ((square, u), v) in squares.iter_mut().zip(&us).zip(&vs) {
-            // The square of the distance on an equilateral triangle.
-            let (du, dv) = (u - us[m], v - vs[m]);
-            *square = du * du + dv * dv + du * dv;
-        }
-        squares[m] = f32::INFINITY;
-        // The nearest so far, the furthest of them last.
-        let mut nearest = [(f32::INFINITY, false); NEIGHBOURS];
-        for (squares, dark) in squares.chunks(AT_ONCE).zip(is_dark.chunks(AT_ONCE)) {
-            let furthest = nearest[NEIGHBOURS - 1].0;
-            if !squares.iter().fold(false, |any, square| any | (*square < furthest)) {
-                continue;
-            }
-            for (square, dark) in squares.iter().zip(dark) {
-                if *square < nearest[NEIGHBOURS - 1].0 {
-                    let mut k = NEIGHBOURS - 1;
-                    while k > 0 && *square < nearest[k - 1].0 {
-                        nearest[k] = nearest[k - 1];
-                        k -= 1;
-                    }
-                    nearest[k] = (*square, *dark);
-                }
-            }
-        }
-        let dark = nearest.iter().filter(|(_, dark)| *dark).count();
-        let all = nearest.iter().filter(|(square, _)| square.is_finite()).count();
-        buried += u32::from(2 * dark >= all);
-    }
-    let kept = row.len() as u32 - buried;
-    (kept, kept as f32 / row.len().max(1) as f32)
 }

@@ -6,6 +6,7 @@
 //! Lights beyond the first thirty-odd share columns; to dim one of them means to add up its column anew.
 
 use super::body::{Bounds, Site, bounds_of, given_at};
+use super::chunk::ROWS;
 use super::world::World;
 use crate::luminaires::Piece;
 use crate::one_light::{geometry, sample_piece};
@@ -66,6 +67,15 @@ enum Source {
     Piece(Piece, usize),
     /// With the position about the middle of the scene.
     Point(PointLight),
+}
+
+/// What the shadow rays of an element are made from.
+pub struct Draws {
+    seed: u32,
+    /// Where on the light they end.
+    spots: Sequence,
+    /// Where they begin: as rays of the element's row, of which it is known whether they count.
+    places: Sequence,
 }
 
 /// One shadow ray.
@@ -194,14 +204,15 @@ impl Column {
         matches!(self.emitters.as_slice(), [Emitter { source: Source::Point(_), .. }])
     }
 
-    /// The points that an element's shadow rays are made from.
-    pub fn sequence(&self, seed: u32) -> Sequence {
-        Sequence::new(seed, SHADOW ^ hash(self.key))
+    /// What an element's shadow rays are made from.
+    pub fn draws(&self, seed: u32) -> Draws {
+        let spots = Sequence::new(seed, SHADOW ^ hash(self.key));
+        Draws { seed, spots, places: Sequence::new(seed, ROWS) }
     }
 
     /// Spots of its lamps that have area, drawn by their shares of the power.
     pub fn spots(&self, world: &World, count: usize) -> Vec<Spot> {
-        let sequence = self.sequence(0);
+        let Draws { spots: sequence, .. } = self.draws(0);
         let spot = |index: u32| {
             let [u, v, ..] = sequence.point(index).map(f64::from);
             let (Emitter { lamp, source }, share, stretched) = self.pick(u)?;
@@ -276,11 +287,11 @@ impl Column {
     }
 
     /// Shadow ray `index` of an element; none where nothing can arrive.
-    pub fn sample(&self, world: &World, site: &Site, (seed, sequence): (u32, &Sequence), index: u32) -> Option<Sample> {
-        let [u, v, x, y] = sequence.point(index);
+    pub fn sample(&self, world: &World, site: &Site, draws: &Draws, index: u32) -> Option<Sample> {
+        let ([u, v], [_, _, x, y]) = (draws.spots.pair(index), draws.places.point(index));
         let place = site.place(x, y);
         let (Emitter { lamp, source }, share, stretched) = self.pick(f64::from(u))?;
-        let salt = hash(seed ^ hash(self.key ^ index));
+        let salt = hash(draws.seed ^ hash(self.key ^ index));
         let strength = self.strength[*lamp];
         let lit = |weight: f64, given: Bands| -> [f64; 3] {
             std::array::from_fn(|band| weight * f64::from(given[band]) * f64::from(strength[band]))

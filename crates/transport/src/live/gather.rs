@@ -23,36 +23,44 @@ impl Live {
         assert_eq!((values.len(), means.len()), (self.ids(), self.ids()));
         self.each_chunk(means, |chunk, means| {
             for (e, mean) in means.iter_mut().enumerate() {
-                let (row, share) = chunk.row(e, rays);
+                let row = chunk.row(e, rays);
                 // Four sums side by side: each addition would wait for the one before it.
                 let mut sums = [[0f32; W]; 4];
-                for ids in row.into_iter().flat_map(|part| part.chunks_exact(4)) {
-                    for (sum, id) in sums.iter_mut().zip(ids) {
-                        let value = &values[*id as usize].0;
-                        for k in 0..W {
-                            sum[k] += value[k];
-                        }
+                let mut add = |sum: usize, id: u32| {
+                    let value = &values[id as usize].0;
+                    (0..W).for_each(|k| sums[sum][k] += value[k]);
+                };
+                if row.is_whole() {
+                    for ids in row.ids.into_iter().flat_map(|part| part.chunks_exact(4)) {
+                        (0..4).for_each(|sum| add(sum, ids[sum]));
                     }
+                } else {
+                    row.counting().for_each(|(m, id)| add(m as usize % 4, id));
                 }
-                *mean = Lanes(std::array::from_fn(|k| ((sums[0][k] + sums[1][k]) + (sums[2][k] + sums[3][k])) * share));
+                let sum = |k: usize| (sums[0][k] + sums[1][k]) + (sums[2][k] + sums[3][k]);
+                *mean = Lanes(std::array::from_fn(|k| sum(k) * row.share));
             }
         });
     }
 
-    /// Half the difference between the halves of each row.
+    /// Half the difference between the means over the halves of each row.
     pub fn half_differences(&self, values: &[Lanes<4>], rays: usize, differences: &mut [Lanes<4>]) {
         self.each_chunk(differences, |chunk, differences| {
             for (e, difference) in differences.iter_mut().enumerate() {
-                let (row, share) = chunk.row(e, rays);
-                let rays = row[0].len() + row[1].len();
-                let mut sums = [[0f32; 4]; 2];
-                for (m, id) in row.into_iter().flatten().enumerate() {
-                    let (sum, value) = (&mut sums[usize::from(2 * m >= rays)], &values[*id as usize].0);
-                    for k in 0..4 {
-                        sum[k] += value[k];
-                    }
+                let row = chunk.row(e, rays);
+                let (mut sums, mut counts) = ([[0f32; 4]; 2], [0u32; 2]);
+                for (m, id) in row.counting() {
+                    let (half, value) = (usize::from(2 * m as usize >= row.len()), &values[id as usize].0);
+                    counts[half] += 1;
+                    (0..4).for_each(|k| sums[half][k] += value[k]);
                 }
-                *difference = Lanes(std::array::from_fn(|k| (sums[0][k] - sums[1][k]) * share));
+                // Halves of which one has nothing tell nothing.
+                if row.share > 0.0 && !counts.contains(&0) {
+                    let [a, b] = counts.map(|count| 0.5 / count as f32);
+                    *difference = Lanes(std::array::from_fn(|k| sums[0][k] * a - sums[1][k] * b));
+                } else {
+                    *difference = Lanes::default();
+                }
             }
         });
     }

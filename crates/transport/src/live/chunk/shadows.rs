@@ -1,8 +1,8 @@
 //! Shadow rays of a chunk: which came through, and what they bring.
 
-use super::super::body::{Bounds, Site};
+use super::super::body::Bounds;
 use super::dirt::Dirt;
-use super::{Chunk, NEAR_SHADOWS, Part, Work};
+use super::{Chunk, NEAR_SHADOWS, Part, Work, ones};
 use glam::DVec3;
 use radiosity_scene::Bands;
 
@@ -27,23 +27,49 @@ impl Shadows {
 }
 
 impl Chunk {
-    /// Adds up the light of a column anew, whose strengths have changed.
-    pub fn add_up(&mut self, work: &Work, column: usize) {
-        let body = &work.world.bodies[self.body];
-        if !body.is_present {
+    /// Adds up the light of a column anew where its strengths have changed or other rays count; a bit for each element.
+    pub fn add_up(&mut self, work: &Work, column: usize, elements: u64) {
+        if !work.world.bodies[self.body].is_present || work.columns[column].is_empty() {
             return;
         }
-        for e in 0..self.len {
-            let (site, seed) = self.site(work.world, e);
-            let shadows = &self.shadows[column];
-            let (n, clear) = (shadows.rays, shadows.clear[e]);
-            self.shadows[column].light[e] = bring(work, column, (&site, seed), n, clear);
+        for e in (0..self.len).filter(|e| elements >> e & 1 == 1) {
+            self.bring(work, column, e, self.shadows[column].rays);
             self.shadows[column].is_rough[e] = false;
         }
     }
 
-    /// Traces the shadow rays to a column that changes have dirtied.
-    pub(super) fn mend_shadows(&mut self, work: &Work, part: Part, dirt: &Dirt, column: usize) -> u64 {
+    /// Adds up what the first `n` shadow rays of an element bring.
+    fn bring(&mut self, work: &Work, column: usize, e: usize, n: u32) {
+        let (site, seed) = self.site(work.world, e);
+        let (light, shadows) = (&work.columns[column], &self.shadows[column]);
+        let (draws, counting) = (light.draws(seed), self.counting(e, n));
+        let mut sum = [0f64; 3];
+        for index in ones(counting & shadows.clear[e]) {
+            if let Some(sample) = light.sample(work.world, &site, &draws, index) {
+                (0..3).for_each(|band| sum[band] += sample.light[band]);
+            }
+        }
+        self.shadows[column].light[e] = mean(sum, counting);
+    }
+
+    /// Which of the first `n` shadow rays of an element count; where none does, so few are not enough to choose from.
+    fn counting(&self, e: usize, n: u32) -> u64 {
+        let all = ((1u128 << n) - 1) as u64;
+        match all & self.kept[e * self.words] {
+            0 => all,
+            kept => kept,
+        }
+    }
+
+    /// Traces the shadow rays to a column that changes have dirtied. Other rays than before count for elements whose bit is set in
+    /// `replaced`.
+    pub(super) fn mend_shadows(
+        &mut self,
+        work: &Work,
+        part: Part,
+        (dirt, replaced): (&Dirt, u64),
+        column: usize,
+    ) -> u64 {
         let known = self.shadows[column].rays;
         let light = &work.columns[column];
         if known == 0 || light.is_empty() {
@@ -58,7 +84,7 @@ impl Chunk {
         // came back was elsewhere meanwhile, for the first part only.
         let is_rough = |e: usize| part == Part::Far && self.shadows[column].is_rough[e];
         let is_near = |region: &(Bounds, (DVec3, f64))| light.may_meet(self.ball, region);
-        if !dirt.before.iter().chain(&dirt.now).any(is_near) && !(0..self.len).any(is_rough) {
+        if !dirt.before.iter().chain(&dirt.now).any(is_near) && !(0..self.len).any(is_rough) && replaced == 0 {
             return 0;
         }
         let all = ((1u128 << range.end) - (1u128 << range.start)) as u64;
@@ -71,12 +97,13 @@ impl Chunk {
             let may_change = light.may_reach(&site)
                 && (clear & all != all && dirt.before.iter().any(is_near)
                     || clear & all != 0 && dirt.now.iter().any(is_near));
-            if !may_change && !is_rough {
+            let is_replaced = replaced >> e & 1 == 1;
+            if !may_change && !is_rough && !is_replaced {
                 continue;
             }
-            let sequence = light.sequence(seed);
+            let draws = light.draws(seed);
             for index in range.clone().filter(|_| may_change) {
-                let Some(sample) = light.sample(world, &site, (seed, &sequence), index) else { continue };
+                let Some(sample) = light.sample(world, &site, &draws, index) else { continue };
                 let bit = 1u64 << index;
                 let (origin, direction) = (sample.ray.origin.as_dvec3(), sample.ray.direction.as_dvec3());
                 let meets = |(bounds, _): &(Bounds, (DVec3, f64))| {
@@ -97,12 +124,14 @@ impl Chunk {
                 }
             }
             let own = &mut self.shadows[column];
-            if std::mem::replace(&mut own.clear[e], clear) == clear && !is_rough {
+            let has_changed = std::mem::replace(&mut own.clear[e], clear) != clear;
+            if !has_changed && !is_rough && !is_replaced {
                 continue;
             }
-            own.is_rough[e] = part == Part::Near && known > NEAR_SHADOWS;
+            // What only counts otherwise is known of all of them.
+            own.is_rough[e] = part == Part::Near && known > NEAR_SHADOWS && (has_changed || own.is_rough[e]);
             let n = if own.is_rough[e] { NEAR_SHADOWS } else { known };
-            own.light[e] = bring(work, column, (&site, seed), n, clear);
+            self.bring(work, column, e, n);
         }
         rays
     }
@@ -116,42 +145,35 @@ impl Chunk {
         let mut rays = 0;
         for e in 0..self.len {
             let (site, seed) = self.site(world, e);
-            let sequence = light.sequence(seed);
+            let draws = light.draws(seed);
             let mut clear = self.shadows[column].clear[e];
+            let counting = self.counting(e, target);
             let mut sum = [0f64; 3];
             for index in from..target {
-                if let Some(sample) = light.sample(world, &site, (seed, &sequence), index) {
+                if let Some(sample) = light.sample(world, &site, &draws, index) {
                     rays += 1;
                     if !world.blocked(&sample.ray, sample.salt) {
                         clear |= 1 << index;
-                        (0..3).for_each(|band| sum[band] += sample.light[band]);
+                        if counting >> index & 1 == 1 {
+                            (0..3).for_each(|band| sum[band] += sample.light[band]);
+                        }
                     }
                 }
             }
             self.shadows[column].clear[e] = clear;
-            // The same sum by `bring` would draw all samples once more.
-            let is_first = from == 0;
-            self.shadows[column].light[e] =
-                if is_first { mean(sum, target) } else { bring(work, column, (&site, seed), target, clear) };
+            if from == 0 {
+                // The same sum by `bring` would draw all samples once more.
+                self.shadows[column].light[e] = mean(sum, counting);
+            } else {
+                self.bring(work, column, e, target);
+            }
             self.shadows[column].is_rough[e] = false;
         }
         rays
     }
 }
 
-/// What the first `n` shadow rays bring, given which are clear.
-fn bring(work: &Work, column: usize, (site, seed): (&Site, u32), n: u32, clear: u64) -> Bands {
-    let light = &work.columns[column];
-    let sequence = light.sequence(seed);
-    let mut sum = [0f64; 3];
-    for index in (0..n).filter(|index| clear >> index & 1 == 1) {
-        if let Some(sample) = light.sample(work.world, site, (seed, &sequence), index) {
-            (0..3).for_each(|band| sum[band] += sample.light[band]);
-        }
-    }
-    mean(sum, n)
-}
-
-fn mean(sum: [f64; 3], n: u32) -> Bands {
-    sum.map(|s| (s / f64::from(n.max(1))) as f32)
+/// Of rays for each of which a bit is set.
+fn mean(sum: [f64; 3], counting: u64) -> Bands {
+    sum.map(|s| (s / f64::from(counting.count_ones().max(1))) as f32)
 }
