@@ -51,6 +51,13 @@ impl Lanes {
         Lanes([larger(a, e), larger(b, f), larger(c, g), larger(d, h)])
     }
 
+    /// The smaller of each.
+    #[inline(always)]
+    pub fn min(self, other: Lanes) -> Lanes {
+        let (Lanes([a, b, c, d]), Lanes([e, f, g, h])) = (self, other);
+        Lanes([smaller(a, e), smaller(b, f), smaller(c, g), smaller(d, h)])
+    }
+
     /// Own lanes where `condition` is above zero, others' elsewhere.
     #[inline(always)]
     pub fn above_zero(Lanes([p, q, r, s]): Lanes, Lanes([a, b, c, d]): Lanes, Lanes([e, f, g, h]): Lanes) -> Lanes {
@@ -62,6 +69,11 @@ impl Lanes {
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
 /// Four vectors, by coordinate.

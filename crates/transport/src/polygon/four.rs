@@ -75,6 +75,18 @@ impl Four {
     }
 }
 
+/// [`super::point_to_polygon_above`] of four quadrilaterals, by their corners.
+#[inline(always)]
+pub(crate) fn quads_above(corners: &[Vectors; 4], point: DVec3, normal: DVec3) -> Lanes {
+    let (from, up) = (everywhere(point), everywhere(normal));
+    let [a, b, c, d] = corners;
+    let (a, b, c, d) = (minus(*a, from), minus(*b, from), minus(*c, from), minus(*d, from));
+    let (p, q, r, s) = (inverse_length(a), inverse_length(b), inverse_length(c), inverse_length(d));
+    let sum = contour((d, s), (a, p), up) + contour((a, p), (b, q), up);
+    let sum = sum + contour((b, q), (c, r), up) + contour((c, r), (d, s), up);
+    (sum / Lanes::of(std::f64::consts::TAU)).max(Lanes::of(0.0))
+}
+
 /// One over the lengths; zero where they are.
 #[inline(always)]
 fn inverse_length(v: Vectors) -> Lanes {

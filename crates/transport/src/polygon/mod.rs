@@ -6,6 +6,7 @@
 mod four;
 
 pub use four::Four;
+pub(crate) use four::quads_above;
 
 use glam::DVec3;
 

@@ -3,6 +3,7 @@
 //! Parts of one plane that face the same way stay together, for what holds of a wall and a wall holds of all that is on
 //! them. A cluster keeps the corners of a hull: its rectangle if it lies in a plane, else its box.
 
+use super::lattice::Lattice;
 use super::panel::Planes;
 use super::part::Part;
 use glam::{DVec2, DVec3};
@@ -25,6 +26,8 @@ pub struct Cluster {
     pub halves: Option<[u32; 2]>,
     /// Largest distance between corners of the hull.
     pub extent: f64,
+    /// Places of the parts of a leaf.
+    pub lattice: Option<Lattice>,
 }
 
 /// The tree.
@@ -53,9 +56,12 @@ impl Clusters {
         if !walls.is_empty() {
             builder.over_walls(&mut walls);
         }
-        let Builder { from, order, nodes, .. } = builder;
+        let Builder { from, order, mut nodes, .. } = builder;
         let mut taken: Vec<Option<Part>> = from.into_iter().map(Some).collect();
-        let parts = order.into_iter().filter_map(|i| taken[i].take()).collect();
+        let parts: Vec<Part> = order.into_iter().filter_map(|i| taken[i].take()).collect();
+        for leaf in nodes.iter_mut().filter(|node| node.halves.is_none()) {
+            leaf.lattice = Some(Lattice::new(&parts[leaf.parts.clone()], leaf.extent));
+        }
         Clusters { nodes, parts }
     }
 
@@ -152,7 +158,7 @@ impl Builder<'_> {
 
     fn push(&mut self, start: usize, hull: Vec<DVec3>, plane: Option<(DVec3, f64)>, halves: Option<[u32; 2]>) -> u32 {
         let extent = hull.iter().map(|c| c.distance(hull[0])).fold(0.0, f64::max);
-        self.nodes.push(Cluster { parts: start..self.order.len(), hull, plane, halves, extent });
+        self.nodes.push(Cluster { parts: start..self.order.len(), hull, plane, halves, extent, lattice: None });
         (self.nodes.len() - 1) as u32
     }
 }

@@ -22,11 +22,11 @@ use radiosity_scene::Facet;
 use smallvec::SmallVec;
 
 /// Places are drawn this much towards the middle: on an edge that both parts share, a factor has no one value.
-const INSIDE: f64 = 1e-7;
+pub const INSIDE: f64 = 1e-7;
 
 /// Least height of a corner above the other polygon's plane, by the greatest: below it, all that reaches the corner
 /// changes too fast for places to tell.
-const STEEP: f64 = 1e-3;
+pub const STEEP: f64 = 1e-3;
 
 /// Error of visible and hidden together over all cells, relative to the tolerance.
 const OF_WHOLE: f64 = 0.01;
@@ -115,6 +115,27 @@ pub fn distance<'a>(place: DVec3, panels: impl Iterator<Item = &'a Panel>) -> f6
     panels.map(|panel| panel.distance(place)).fold(f64::INFINITY, f64::min)
 }
 
+/// The most that panels might hide from the centre of a cell with a normal, seen from any of its places: what of each lies in
+/// the shaft.
+pub fn possible<'a>(
+    mut shaft: Shaft,
+    (cell, normal): (&[DVec3], DVec3),
+    panels: impl Iterator<Item = &'a Panel>,
+) -> f64 {
+    let centre = cell.iter().sum::<DVec3>() / cell.len() as f64;
+    let mut sum = 0.0;
+    for panel in panels {
+        let mut part = shaft.part_of(panel);
+        if panel.height(centre) < 0.0 {
+            part.reverse();
+        }
+        if part.len() >= 3 {
+            sum += lambert(centre, normal, &part);
+        }
+    }
+    sum
+}
+
 /// What a part sees of another past panels.
 struct View<'a, 'b> {
     shadows: &'a mut Shadows,
@@ -174,20 +195,8 @@ impl Shaded for View<'_, '_> {
 
     fn possible(&mut self, corners: &[DVec3], list: &[u16], without: u64) -> f64 {
         let Stage { setting, body_of, normal, .. } = self.stage;
-        let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
-        let mut shaft = self.shaft(corners);
-        let mut sum = 0.0;
-        for &k in list.iter().filter(|k| bit(body_of[**k as usize]) & without == 0) {
-            let panel = setting.panels[k as usize];
-            let mut part = shaft.part_of(panel);
-            if panel.height(centre) < 0.0 {
-                part.reverse();
-            }
-            if part.len() >= 3 {
-                sum += lambert(centre, *normal, &part);
-            }
-        }
-        sum
+        let others = list.iter().filter(|k| bit(body_of[**k as usize]) & without == 0);
+        possible(self.shaft(corners), (corners, *normal), others.map(|k| setting.panels[*k as usize]))
     }
 
     fn whole(&mut self, cell: &Frame) -> Exchange {

@@ -1,8 +1,9 @@
 //! View factors of an enclosure: the default way, chosen pair by pair.
 //!
 //! Pairs are judged in clusters first (`walk`, `cluster`, `shaft`): facing away, proven blocked, proven clear, or mixed. Clear
-//! ones take cubature or the closed form (`clear`); mixed ones the exact visible factor from points of one part (`mixed`,
-//! `visible`), of which neighbours in a leaf share what they can. The exchange area A_i F_ij is stored once per pair, so
+//! ones take cubature or the closed form (`clear`); mixed ones the exact visible factor from points of one part, which two
+//! leaves share (`gallery`, `lattice`), and where those do not suffice from points that are chosen for the pair (`mixed`,
+//! `visible`). The exchange area A_i F_ij is stored once per pair, so
 //! reciprocity holds by storage; what the rows lack of one is therefore an honest measure of the error, and is reported before
 //! any repair (`closure`).
 
@@ -13,6 +14,8 @@ mod clear;
 mod closure;
 mod cluster;
 mod frame;
+mod gallery;
+mod lattice;
 mod mixed;
 mod moments;
 mod panel;
@@ -33,6 +36,7 @@ use crate::row::GpuError;
 use crate::{Progress, Stopped};
 use cell::Sights;
 use cluster::Clusters;
+use gallery::Kept;
 pub(crate) use panel::{Planes, convex_pieces, panels, united};
 use part::Part;
 use radiosity_scene::Enclosure;
@@ -167,6 +171,7 @@ pub fn view_factors(
             touch,
             shadows: Shadows::default(),
             sights: Sights::default(),
+            kept: Kept::default(),
             choices: Choices::default(),
             entries: Vec::new(),
         };

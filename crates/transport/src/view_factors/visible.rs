@@ -16,17 +16,17 @@ use std::ops::Range;
 pub type Loop = SmallVec<[DVec3; 10]>;
 
 /// Heights below this are taken for zero, relative to the largest of the polygon: cuts along an edge leave no slivers.
-const ROUNDING: f64 = 1e-12;
+pub const ROUNDING: f64 = 1e-12;
 
 /// Shadows up to which each takes away what none before it has taken; of more, any two that overlap would double the
 /// work, and what they leave is cut into pieces.
-const FEW: usize = 8;
+pub const FEW: usize = 8;
 
 /// A plane: a normal n, and n · x of its points.
 pub type Plane = (DVec3, f64);
 
 /// An odd number whose multiples mix bits.
-const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
+pub const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The shadows of bodies as a point throws them: each is all that has positive heights over some planes.
 pub struct Shadows {
@@ -117,6 +117,34 @@ impl Shadows {
             hidden_all = whole - left.iter().map(|piece| lambert(x, normal, piece)).sum::<f64>();
         }
         Sight::Partly { factors: [(whole - hidden_all).max(0.0), hidden_all], bodies, how: hash }
+    }
+}
+
+impl Shadows {
+    /// F to what the last of some shadows hides of a polygon and none before it does, where only some of its planes cut: those
+    /// for which `cuts` holds; and the corners that lie outside, as bits. None if it hides nothing.
+    pub fn hidden_by_last(
+        &mut self,
+        (x, normal): (DVec3, DVec3),
+        target: &[DVec3],
+        (shadows, planes): (&[(u16, Range<usize>)], &[Plane]),
+        cuts: impl Fn(usize) -> bool,
+    ) -> Option<(f64, u64)> {
+        let [clip, clips @ ..] = &mut self.clips;
+        let ((_, last), before) = shadows.split_last()?;
+        let mut outside = 0;
+        clip.part.clear();
+        clip.part.extend_from_slice(target);
+        for &(normal, offset) in last.clone().filter(|k| cuts(*k)).map(|k| &planes[k]) {
+            if !clip.keep_above(normal, offset) {
+                return None;
+            }
+            for (i, p) in target.iter().enumerate() {
+                outside |= u64::from(normal.dot(*p) < offset) << i;
+            }
+        }
+        let own = lambert(x, normal, &clip.part);
+        Some((own - hidden((x, normal), &clip.part, own, (before, planes), clips), outside))
     }
 }
 

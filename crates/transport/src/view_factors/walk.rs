@@ -5,6 +5,7 @@ use super::body::Setting;
 use super::cell::{List as Chosen, Sights};
 use super::clear::{Exchange, clear};
 use super::cluster::{Cluster, Clusters, LEAF};
+use super::gallery::{Between, Gallery, Kept};
 use super::mixed::{Stage, above, distance};
 use super::moments::{Far, Four, Moments};
 use super::panel::Panel;
@@ -90,6 +91,7 @@ pub struct Walk<'a> {
     pub touch: f64,
     pub shadows: Shadows,
     pub sights: Sights,
+    pub kept: Kept,
     pub choices: Choices,
     pub entries: Vec<Entry>,
 }
@@ -168,45 +170,129 @@ impl<'a> Walk<'a> {
         let moments: SmallVec<[&Moments; LEAF]> =
             self.clusters.parts[outer.parts.clone()].iter().map(|part| &part.moments).collect();
         let fours: SmallVec<[Four; LEAF / 4]> = moments.chunks(4).map(Four::new).collect();
-        for target in inner.parts.clone() {
-            self.target((outer, &fours), target, between);
+        if between.is_empty() || !self.gallery((outer, &fours), inner, between) {
+            for target in inner.parts.clone() {
+                self.target((outer, &fours), target, outer.parts.clone(), between);
+            }
         }
     }
 
-    /// All pairs of a leaf, of whose parts the moments are given, with one part.
-    fn target(&mut self, (outer, fours): (&'a Cluster, &[Four]), target: usize, between: &[u32]) {
+    /// All pairs of two leaves, of whose first the moments are given, past panels that all of them share; whether that could be.
+    fn gallery(&mut self, (outer, fours): (&'a Cluster, &[Four]), inner: &'a Cluster, between: &[u32]) -> bool {
+        let (clusters, obstacles) = (self.clusters, Obstacles { panels: self.panels, solids: self.solids });
+        let Some(lattice) = &outer.lattice else { return false };
+        let panels = self.facing(between, &outer.hull);
+        let (parts, targets) = (&clusters.parts[outer.parts.clone()], &clusters.parts[inner.parts.clone()]);
+        let setting = Setting { panels: &panels, obstacles, target: &[], touch: self.touch };
+        let mut kept = std::mem::take(&mut self.kept);
+        let gallery =
+            Gallery::new((lattice, parts), (&outer.hull, parts[0].shape.normal()), targets, setting, &mut kept);
+        let is_done = gallery.is_some();
+        if let Some(mut gallery) = gallery {
+            for target in inner.parts.clone() {
+                self.in_gallery(&mut gallery, (outer, fours), (target, target - inner.parts.start), between);
+            }
+        }
+        self.kept = kept;
+        is_done
+    }
+
+    /// Of panels those that may hide something from a region: of solids outside of it the faces that look towards it.
+    fn facing(&self, panels: &[u32], region: &[DVec3]) -> SmallVec<[&'a Panel; 16]> {
+        let obstacles = Obstacles { panels: self.panels, solids: self.solids };
+        let panels = panels.iter().map(|panel| &self.panels[*panel as usize]);
+        panels.filter(|panel| !looks_away(panel, obstacles, region, self.touch)).collect()
+    }
+
+    /// All pairs of a leaf with one part, by index and its number in the gallery.
+    fn in_gallery(
+        &mut self,
+        gallery: &mut Gallery,
+        (outer, fours): (&'a Cluster, &[Four]),
+        (target, number): (usize, usize),
+        between: &[u32],
+    ) {
+        let b = &self.clusters.parts[target];
+        let facing = Facing::of([End::of_cluster(outer), End::of_part(b)], self.touch);
+        if facing == Facing::Away {
+            self.choices.facing_away += outer.parts.len();
+            return;
+        }
+        let far = Far::of(fours, &b.moments);
+        let mut left: SmallVec<[usize; LEAF]> = SmallVec::new();
+        for (k, part) in outer.parts.clone().enumerate() {
+            let a = &self.clusters.parts[part];
+            let facing =
+                if facing == Facing::Partly { Facing::of([a, b].map(End::of_part), self.touch) } else { facing };
+            let between = match facing {
+                Facing::Away => {
+                    self.choices.facing_away += 1;
+                    continue;
+                }
+                Facing::Partly => None,
+                Facing::Whole => gallery.between(k, number),
+            };
+            let far = far.exchange(k);
+            match between {
+                Some(Between::Nothing) => self.clear((a, b), far, false),
+                Some(Between::All) => self.choices.blocked += 1,
+                Some(Between::Some(bodies)) => {
+                    let tolerance = self.tolerance(a, b);
+                    let (whole, _) = clear(a, b, far, WHOLE * tolerance, false);
+                    match gallery.mixed((k, number), bodies, whole, (tolerance - whole.error).max(0.5 * tolerance)) {
+                        Some(found) => {
+                            self.choices.clipped += 1;
+                            self.add((a, b), found);
+                        }
+                        None => left.push(part),
+                    }
+                }
+                None => left.push(part),
+            }
+        }
+        if !left.is_empty() {
+            self.target((outer, fours), target, left.into_iter(), between);
+        }
+    }
+
+    /// Parts of a leaf, of whose parts the moments are given, with one part.
+    fn target(
+        &mut self,
+        (outer, fours): (&'a Cluster, &[Four]),
+        target: usize,
+        parts: impl ExactSizeIterator<Item = usize>,
+        between: &[u32],
+    ) {
         let clusters = self.clusters;
         let inner = &clusters.parts[target];
         let ends = [End::of_cluster(outer), End::of_part(inner)];
         let facing = Facing::of(ends, self.touch);
         if facing == Facing::Away {
-            self.choices.facing_away += outer.parts.len();
+            self.choices.facing_away += parts.len();
             return;
         }
         let left = if between.is_empty() { Some(List::new()) } else { self.standing(ends, between, Look::Close) };
         let Some(between) = left else {
-            self.choices.blocked += outer.parts.len();
+            self.choices.blocked += parts.len();
             return;
         };
         let far = Far::of(fours, &inner.moments);
         let mut target = Target { inner, facing, panels: &[], stage: None, far, first: outer.parts.start };
         if between.is_empty() {
-            outer.parts.clone().for_each(|part| self.pair(part, &mut target));
+            parts.for_each(|part| self.pair(part, &mut target));
             return;
         }
         let obstacles = Obstacles { panels: self.panels, solids: self.solids };
         let first = End::of_part(&clusters.parts[outer.parts.start]);
         let (region, shape) = (above(&outer.hull, ends[1].plane), above(inner.shape.corners(), first.plane));
         let from = region.as_deref().unwrap_or(&outer.hull);
-        let panels = between.iter().map(|panel| &self.panels[*panel as usize]);
-        let panels: SmallVec<[&Panel; 16]> =
-            panels.filter(|panel| !looks_away(panel, obstacles, from, self.touch)).collect();
+        let panels = self.facing(&between, from);
         target.panels = &panels;
         if let (Some(shape), Some((normal, _))) = (&shape, first.plane) {
             let setting = Setting { panels: &panels, obstacles, target: shape, touch: self.touch };
             target.stage = Stage::new(from, normal, inner, setting, &mut self.sights);
         }
-        outer.parts.clone().for_each(|part| self.pair(part, &mut target));
+        parts.for_each(|part| self.pair(part, &mut target));
     }
 
     /// Error of A_i F_ij that two parts may have: their share of what their surfaces may, m².
@@ -242,25 +328,35 @@ impl<'a> Walk<'a> {
             }
         }
         let (far, is_cut) = (target.far.exchange(part - target.first), facing == Facing::Partly);
-        let exchange = if list.is_empty() {
-            let least = a.moments.area.min(b.moments.area);
-            let (whole, order) = clear(a, b, far, self.options.clear_accuracy * least, is_cut);
-            match order {
-                0 => self.choices.clear_closed_form += 1,
-                order => self.choices.clear_cubature[order - 1] += 1,
-            }
-            whole
-        } else {
-            self.choices.clipped += 1;
-            let tolerance = self.tolerance(a, b);
-            // Past panels the whole is asked for little more exactly than what is left of it.
-            let (whole, _) = clear(a, b, far, WHOLE * tolerance, is_cut);
-            let tolerance = (tolerance - whole.error).max(0.5 * tolerance);
-            let scratch = (&mut self.shadows, &mut self.sights);
-            let found = target.stage.as_mut().and_then(|stage| stage.mixed(scratch, a, &list, whole, tolerance));
-            // Too thin a strip sees the other, or too much stands between for a list.
-            found.unwrap_or(Exchange { value: 0.5 * whole.value, error: 0.5 * whole.value + whole.error })
-        };
+        if list.is_empty() {
+            return self.clear((a, b), far, is_cut);
+        }
+        self.choices.clipped += 1;
+        let tolerance = self.tolerance(a, b);
+        // Past panels the whole is asked for little more exactly than what is left of it.
+        let (whole, _) = clear(a, b, far, WHOLE * tolerance, is_cut);
+        let tolerance = (tolerance - whole.error).max(0.5 * tolerance);
+        let scratch = (&mut self.shadows, &mut self.sights);
+        let found = target.stage.as_mut().and_then(|stage| stage.mixed(scratch, a, &list, whole, tolerance));
+        // Too thin a strip sees the other, or too much stands between for a list.
+        self.add(
+            (a, b),
+            found.unwrap_or(Exchange { value: 0.5 * whole.value, error: 0.5 * whole.value + whole.error }),
+        );
+    }
+
+    /// Two parts that see each other whole, where they face each other at all.
+    fn clear(&mut self, (a, b): (&Part, &Part), far: Exchange, is_cut: bool) {
+        let least = a.moments.area.min(b.moments.area);
+        let (whole, order) = clear(a, b, far, self.options.clear_accuracy * least, is_cut);
+        match order {
+            0 => self.choices.clear_closed_form += 1,
+            order => self.choices.clear_cubature[order - 1] += 1,
+        }
+        self.add((a, b), whole);
+    }
+
+    fn add(&mut self, (a, b): (&Part, &Part), exchange: Exchange) {
         if exchange.value > 0.0 || exchange.error > 0.0 {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));
         }
