@@ -201,8 +201,11 @@ mod tests {
         let square = |k: usize, [x0, x1]: [f64; 2], z: f64| {
             [[x0, 0.0], [x1, 0.0], [x1, 1.0], [x0, 1.0]].map(|[x, y]| DVec3::new(x + 20.0 * k as f64, y, z))
         };
-        (0..FLOORS).for_each(|k| drop(scene.add_quad("floor", 0, square(k, [0.0, 1.0], 0.0))));
-        (0..FLOORS).for_each(|k| drop(scene.add_quad("board", 0, square(k, board, height))));
+        for (name, x, z) in [("floor", [0.0, 1.0], 0.0), ("board", board, height)] {
+            for k in 0..FLOORS {
+                scene.add_quad(name, 0, square(k, x, z));
+            }
+        }
         let lamp = scene.add_quad("lamp", 1, square(FLOORS / 2, [0.0, 1.0], 1e4));
         let mut live = Live::new(Arc::new(scene), 20.0, Target { rays: 256, shadows: 64 });
         let column = live.add_column(1, &[Lamp::Body(lamp)]);
