@@ -1,5 +1,5 @@
-//! A model that was lit before carries its light: in a lightmap, at its vertices, or, unlit, in their colours. None of it is read:
-//! light is computed anew, and who opens such a model is told. Its lamps are where [`gltf_out`](crate::gltf_out) put them aside, in the
+//! A model that was lit before carries its light: in a lightmap, at its vertices, or, unlit, in their colours. Lightmaps and light
+//! at vertices are not read, unlit colours are taken for paint: light is computed anew, and who opens such a model is told. Its lamps are where [`gltf_out`](crate::gltf_out) put them aside, in the
 //! `extras` of their nodes, so that they shine again ([`super::light`]); a sky is nowhere in a glTF.
 
 use super::Document;

@@ -225,7 +225,9 @@ fn forget_light(builder: &mut Builder) {
     for material in builder.list("materials").iter_mut().filter_map(Value::as_object_mut) {
         lamps::remove(material, "MOZ_lightmap");
     }
-    builder.list("extensionsUsed").retain(|name| name != "MOZ_lightmap");
+    for name in ["extensionsUsed", "extensionsRequired"] {
+        builder.list(name).retain(|name| name != "MOZ_lightmap");
+    }
 }
 
 /// An instance of EXT_mesh_gpu_instancing.

@@ -387,7 +387,7 @@ impl Chunk {
         }
         let world = work.world;
         let (site, seed) = self.site(world, e);
-        let (sequence, frame, limit) = (Sequence::new(seed, ROWS), frame(site.normal), site.near() as f32);
+        let (sequence, frame, near_limit) = (Sequence::new(seed, ROWS), frame(site.normal), site.near() as f32);
         let (mut rays, mut has_changed) = (0, false);
         for (word, bits) in lost.into_iter().enumerate() {
             for bit in ones(bits) {
@@ -395,7 +395,7 @@ impl Chunk {
                 let m = known.start + 64 * word as u32 + bit;
                 let (ray, direction, salt) = shoot(world, &site, (&sequence, seed), &frame, m);
                 let found = entry(world, world.first(&ray, salt), direction);
-                has_changed |= self.set(work, e, self.at(e, m), found, limit);
+                has_changed |= self.set(work, e, self.at(e, m), found, near_limit);
             }
         }
         let margin = world.margin();
@@ -435,7 +435,7 @@ impl Chunk {
                     }
                 }
                 if let Some(best) = best {
-                    has_changed |= self.set(work, e, at, best, limit);
+                    has_changed |= self.set(work, e, at, best, near_limit);
                 }
             }
         }

@@ -413,7 +413,11 @@ mod tests {
             let kept = row.kept.iter().flat_map(|bits| [*bits as u32, (bits >> 32) as u32]);
             (
                 row.ids.into_iter().flatten().copied().chain(kept).collect::<Vec<_>>(),
-                [row.share.to_bits(), light[0], light[1], light[2]],
+                [chunk.row(e, NEAR_RAYS as usize).share, row.share, chunk.exposed(e)]
+                    .map(f32::to_bits)
+                    .into_iter()
+                    .chain(light)
+                    .collect::<Vec<_>>(),
             )
         };
         let each = live.chunks.iter().flat_map(|chunk| (0..chunk.len).map(move |e| of(chunk, e)));
@@ -433,6 +437,14 @@ mod tests {
             for place in [by, to] {
                 live.place(1, place);
                 live.work(Part::Near, || true);
+                // Layers may be asked for before the rest has followed: no row counts more than all of itself.
+                let (one, mut sums) = (vec![Lanes([1f32; 4]); live.ids()], vec![Lanes::default(); live.ids()]);
+                live.gather(&one, 128, &mut sums);
+                assert!(
+                    sums.iter().all(|sum| sum.0[0] < 1.001),
+                    "{:?}",
+                    sums.iter().map(|sum| sum.0[0]).fold(0.0, f32::max)
+                );
             }
             let rough =
                 |live: &Live| [Chunk::has_rough_light, Chunk::has_rough_rows].map(|is| live.chunks.iter().any(is));

@@ -34,6 +34,9 @@ const NONE: u64 = 1 << 63;
 /// Targets that are looked at together.
 const FOUR: usize = 4;
 
+/// Targets, and fours of them, are bits of small numbers.
+const _: () = assert!(LEAF <= 16 && LEAF.is_multiple_of(FOUR));
+
 /// Error by fewer places, relative to the tolerance, up to which a lattice is asked.
 const HOPE: f64 = 3.0;
 
@@ -234,6 +237,7 @@ impl<'a, 'b> Gallery<'a, 'b> {
         let corners = SmallVec::from(corners.map(|place| self.see(place, target)));
         let places = Places { corners, centre: self.see(centre, target) };
         let mut most = None;
+        // What is known does not change from call to call.
         let mut doubt = |gallery: &Self, values, level| {
             let possible = |known: u64| *most.get_or_insert_with(|| gallery.possible(part, target, past & !known));
             places.doubt(values, area, level, possible)
@@ -241,7 +245,7 @@ impl<'a, 'b> Gallery<'a, 'b> {
         // On either side of the plane of a face outlines are others.
         if low >= STEEP * high && !self.are_crossed[part] {
             let told = places.tell(area, None, true);
-            let mut error = ALONE * told.error + (told.values[0] + told.values[1] - whole.value).abs();
+            let mut error = whole.error + ALONE * told.error + (told.values[0] + told.values[1] - whole.value).abs();
             if error <= COARSE * tolerance {
                 error += doubt(self, told.values, 1.0);
                 if error <= COARSE * tolerance {
@@ -436,7 +440,9 @@ impl Caster {
             Body::Solid(solid) => {
                 body.faces(setting).for_each(|panel| face(panel, 1.0));
                 let solid = &setting.obstacles.solids[solid as usize];
-                let number = |face: u32| solid.faces.iter().position(|f| *f == face).unwrap_or(0) as u8;
+                let number = |face: u32| {
+                    solid.faces.iter().position(|f| *f == face).expect("faces of an edge are the solid's") as u8
+                };
                 edges.extend(solid.edges.iter().map(|(face, beyond, line)| (number(*face), number(*beyond), *line)));
             }
         }

@@ -8,8 +8,7 @@ use rustc_hash::FxHashMap;
 /// Where the places of a part lie along both edges of its parallelogram: its corners in turn and its centre.
 const CELL: [[f64; 2]; 5] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]];
 
-/// Places of a lattice of n, of which one is the centre: seen along either edge they lie an n-th apart, as they hardly do along
-/// any other line closer together. The k-th is at (k, g k) modulo n, where g² + 1 is a multiple of n, so that a quarter of a
+/// Places of a lattice of n, of which one is the centre: no two lie on one line along either edge, and these lines are an n-th apart. The k-th is at (k, g k) modulo n, where g² + 1 is a multiple of n, so that a quarter of a
 /// turn changes nothing.
 const fn lattice<const N: usize>(g: usize) -> [[f64; 2]; N] {
     let n = N + 1;

@@ -181,6 +181,9 @@ impl<'a> Walk<'a> {
     fn gallery(&mut self, (outer, fours): (&'a Cluster, &[Four]), inner: &'a Cluster, between: &[u32]) -> bool {
         let (clusters, obstacles) = (self.clusters, Obstacles { panels: self.panels, solids: self.solids });
         let Some(lattice) = &outer.lattice else { return false };
+        if lattice.of.iter().all(Option::is_none) {
+            return false;
+        }
         let panels = self.facing(between, &outer.hull);
         let (parts, targets) = (&clusters.parts[outer.parts.clone()], &clusters.parts[inner.parts.clone()]);
         let setting = Setting { panels: &panels, obstacles, target: &[], touch: self.touch };

@@ -235,7 +235,7 @@ fn shares(others: &str, named: impl Iterator<Item = (String, f32)>) -> Vec<Share
     shares
 }
 
-/// Shares of all that is told: people add them up. What is not told is less than [`LEAST_TOLD`].
+/// Shares of all that is told: people add them up. Of lights less than [`LEAST_TOLD`] is not told, of surfaces less than [`LEAST_SHARE`].
 fn whole(mut shares: Vec<Share>) -> Vec<Share> {
     let sum: f32 = shares.iter().map(|known| known.share).sum();
     shares.iter_mut().for_each(|known| known.share /= sum);

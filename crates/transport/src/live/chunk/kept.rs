@@ -71,19 +71,17 @@ impl Chunk {
         if exposed < LEAST_EXPOSED {
             exposed = 0.0;
         }
-        let share = |n: usize| match first_ones(&kept, n) {
-            count if count > 0 && exposed > 0.0 => 1.0 / count as f32,
-            _ => 0.0,
-        };
-        self.scale[0][e] = share(near);
-        if known == rays {
-            self.scale[1][e] = share(rays);
-        }
         self.is_rough[e] = known < rays;
         self.exposed[e] = exposed;
+        // Of the rest of a row those count that did, until it is looked at.
+        let told = if known < rays { 1 } else { self.words };
         let own = &mut self.kept[e * self.words..][..self.words];
         let is_other = own[0] != kept[0];
-        own.copy_from_slice(&kept);
+        own[..told].copy_from_slice(&kept[..told]);
+        for (scale, n) in self.scale.iter_mut().zip([near, rays]) {
+            let count = first_ones(own, n);
+            scale[e] = if count > 0 && exposed > 0.0 { 1.0 / count as f32 } else { 0.0 };
+        }
         is_other
     }
 }
