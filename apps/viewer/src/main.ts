@@ -116,4 +116,16 @@ function start(): void {
   Object.assign(window, { radiosity: tests(app) });
 }
 
-start();
+/** Whether the browser draws in three dimensions. */
+function canDraw(): boolean {
+  const context = document.createElement('canvas').getContext('webgl2');
+  context?.getExtension('WEBGL_lose_context')?.loseContext();
+  return context !== null;
+}
+
+if (canDraw()) {
+  start();
+} else {
+  const asked = 'This browser does not draw in three dimensions here, and the page needs it: switch hardware acceleration or WebGL 2 on in the settings of the browser, or open the address in another one.';
+  document.body.append(el('main', {}, el('div', { class: 'veil' }, el('p', { role: 'alert' }, asked))));
+}

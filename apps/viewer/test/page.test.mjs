@@ -1064,3 +1064,19 @@ test('no pixel at an edge is brighter than any light there, as dots were', async
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });
+
+test('a browser that cannot draw in three dimensions says so', async () => {
+  const page = await pages.open(program.url);
+  await page.addInitScript(() => {
+    const { getContext } = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+      return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...rest);
+    };
+  });
+  page.faults.length = 0;
+  await page.reload();
+  await page.getByRole('alert').filter({ hasText: 'WebGL 2' }).waitFor();
+  await picture(page, 'cannot-draw');
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
