@@ -126,6 +126,7 @@ function canDraw(): boolean {
 if (canDraw()) {
   start();
 } else {
+  document.body.classList.add('folded');
   const asked = 'This browser does not draw in three dimensions here, and the page needs it: switch hardware acceleration or WebGL 2 on in the settings of the browser, or open the address in another one.';
   document.body.append(el('main', {}, el('div', { class: 'veil' }, el('p', { role: 'alert' }, asked))));
 }

@@ -150,7 +150,7 @@ fn corners(all: &Comparison) -> Option<[String; 2]> {
             duration(spread.seconds)
         );
     }
-    Some(["The hemicube fails in corners, not for want of cells.".to_owned(), text])
+    Some(["The hemicube’s factors fail in corners, not for want of cells.".to_owned(), text])
 }
 
 /// A form factor to four decimals, as tables have them.

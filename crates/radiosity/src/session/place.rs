@@ -23,9 +23,9 @@ impl Session {
         let (meter, (position, normal)) = (self.meter()?, self.place_of(place)?);
         let arrival =
             self.live.arrive((position, normal), meter.columns.iter().map(|(column, _)| *column), meter.target);
-        let halves = arrival.halves(&self.state.given, meter.columns.iter().map(|(_, factor)| *factor));
+        let factors = || meter.columns.iter().map(|(_, factor)| *factor);
+        let halves = arrival.halves(&self.state.given, factors());
         let irradiance: Bands = std::array::from_fn(|band| 0.5 * (halves[0][band] + halves[1][band]));
-        let [a, b] = halves.map(luminance);
 
         let of = |list: &[Lanes<4>], id: u32| -> Bands {
             list.get(id as usize).map_or([0.0; 3], |h| [h.0[0], h.0[1], h.0[2]])
@@ -82,7 +82,7 @@ impl Session {
                 exitance[band] * factor[band] + reflectance[band] * irradiance[band] + behind[band]
             }),
             direct,
-            error: 0.5 * (a - b).abs(),
+            error: arrival.error(&self.state.given, factors()),
             lights: brightest(lights.into_iter()),
             objects: brightest(objects.into_iter().map(|(body, light)| (ObjectId(body as u32), light))),
         })

@@ -264,8 +264,8 @@ mod tests {
             0 => [1e3, 0.0, 2.0],
             1 => [0.0; 3],
             2 => [if id == 7 { 1e5 } else { 0.0 }; 3],
-            3 => [if id.is_multiple_of(97) { 1e-3 } else { 0.0 }, 4.0, 0.0],
-            _ => [0.0, 0.0, 1e4 / (1.0 + id as f32)],
+            3 => [id as f32, 0.0, 0.0],
+            _ => [if id == 400 { 1e4 } else { 0.0 }; 3],
         };
         let solve = |columns: &[usize]| match columns.len() {
             1 => solved::<4>(live, answer, columns, lit),

@@ -5,12 +5,15 @@ use super::body::Site;
 use super::chunk::{ROWS, Target, shoot};
 use super::{Column, Lanes, Live, Spot};
 use glam::DVec3;
-use radiosity_scene::Bands;
+use radiosity_scene::{Bands, luminance};
 use radiosity_trace::sampling::{Sequence, frame, hash};
 
 /// Places around one another that are looked from before others are taken to see as much of a lamp: half of eight, as of two the line through
 /// them may be the edge of a shadow.
 const PILOTS: usize = 4;
+
+/// Parts of rays that are told apart for their error.
+const EIGHTHS: usize = 8;
 
 /// What arrives at a point.
 #[derive(Clone, Debug)]
@@ -43,6 +46,39 @@ impl Arrival {
             }
         }
         halves.map(|half| half.map(|x| x as f32))
+    }
+
+    /// One standard error of illuminance, lx: for rays of one point alone. Half the difference of two halves is often next to nothing by chance; so
+    /// what halves, quarters and eighths of the rays differ by counts as well, as if error fell with the root of their number. It falls
+    /// faster, and what is told is too much by a third or so.
+    pub fn error(&self, given: &[Lanes<4>], factors: impl Iterator<Item = Bands>) -> f32 {
+        let n = self.found.len();
+        let mut parts = [[0f64; 2]; EIGHTHS];
+        for (m, id) in self.found.iter().enumerate() {
+            let [r, g, b, _] = given[*id as usize].0;
+            let part = &mut parts[m * EIGHTHS / n];
+            *part = [part[0] + f64::from(luminance([r, g, b])), part[1] + 1.0];
+        }
+        let (mut square, mut count) = (0.0, 0.0);
+        for width in [EIGHTHS / 2, EIGHTHS / 4, EIGHTHS / 8] {
+            for pair in parts.chunks(2 * width) {
+                let [a, b] = [&pair[..width], &pair[width..]].map(|half| {
+                    let [sum, rays] = half.iter().fold([0.0; 2], |all, part| [all[0] + part[0], all[1] + part[1]]);
+                    (rays > 0.0).then(|| sum / rays)
+                });
+                if let (Some(a), Some(b)) = (a, b) {
+                    square += (0.5 * (a - b)).powi(2) * pair.len() as f64 / EIGHTHS as f64;
+                    count += 1.0;
+                }
+            }
+        }
+        // Each column has its own shadow rays.
+        let direct = self.direct.iter().zip(factors).map(|(halves, factor)| {
+            let [a, b] =
+                halves.map(|half| f64::from(luminance(std::array::from_fn(|band| half[band] as f32 * factor[band]))));
+            (0.5 * (a - b)).powi(2)
+        });
+        (square / f64::max(count, 1.0) + direct.sum::<f64>()).sqrt() as f32
     }
 }
 
@@ -213,6 +249,36 @@ mod tests {
                 assert!((half[1] / 70.0 - 1.0).abs() < 1e-6, "{n}: {half:?}");
             }
         }
+    }
+
+    /// Below a bright panel off to one side, points are off by about what is told, or less, and no point tells next to nothing.
+    #[test]
+    fn no_point_knows_its_light_too_well() {
+        let mut scene = Scene::default();
+        scene.materials.extend([Material::default(), Material { emissive: [1000.0; 3], ..Material::default() }]);
+        let square = [[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]].map(DVec3::from);
+        scene.add_quad("panel", 0, [0, 3, 2, 1].map(|k| square[k] + DVec3::new(2.0, 0.0, 2.0)));
+        let live = Live::new(Arc::new(scene), 4.0, Target { rays: 4, shadows: 4 });
+        let bright: Vec<Lanes<4>> = (0..live.ids())
+            .map(|id| Lanes([if live.world().bodies[0].has(id as u32) { 1000.0 } else { 0.0 }; 4]))
+            .collect();
+        let at = |k: u32, rays: u32| {
+            let point = DVec3::new(0.01 * f64::from(k), 0.013 * f64::from(k % 7), 0.0);
+            let arrival = live.arrive((point, DVec3::Z), std::iter::empty(), Target { rays, shadows: 2 });
+            let [a, b] = arrival.halves(&bright, std::iter::empty()).map(|half| f64::from(half[1]));
+            (0.5 * (a + b), 0.5 * (a - b).abs(), f64::from(arrival.error(&bright, std::iter::empty())))
+        };
+        let (mut off, mut told, mut least, mut least_by_halves) = (0.0, 0.0, f64::INFINITY, f64::INFINITY);
+        const POINTS: u32 = 100;
+        for k in 0..POINTS {
+            let ((light, by_halves, error), (truth, ..)) = (at(k, 1024), at(k, 1 << 17));
+            off += (light - truth).powi(2) / f64::from(POINTS);
+            told += error.powi(2) / f64::from(POINTS);
+            (least, least_by_halves) = (least.min(error), least_by_halves.min(by_halves));
+        }
+        let (off, told) = (off.sqrt(), told.sqrt());
+        assert!((1.0..3.0).contains(&(told / off)), "{told} {off}");
+        assert!(least > 0.2 * told && least_by_halves < 0.05 * told, "{least} {least_by_halves} {told}");
     }
 
     /// From some way off the spots of a lamp are the lamp: a square of side 2a at height h gives a point below its middle
