@@ -273,14 +273,15 @@ fn layers_are_of_one_state_while_light_follows() {
 /// A furnace: in a closed box of reflectance ρ whose walls all shine alike, H = E/(1 − ρ) everywhere.
 #[test]
 fn a_furnace_is_uniform() {
-    let mut session = Session::new(furnace(1), &small()).unwrap();
+    // As many as by default: beside a solid a ray that seems to begin outside of it meets its black back.
+    let options = SessionOptions { rays: 256, ..small() };
+    let mut session = Session::new(furnace(1), &options).unwrap();
     finish(&mut session);
     let (mut defect, mut whole) = (0.0, 0.0);
     for object in (0..session.model().objects.len() as u32).map(ObjectId) {
         for (h, area) in session.irradiance(object).into_iter().zip(session.exposed_areas(object)) {
             // Within the chairs parts stand flush on each other and see each other's faces in there; nobody else does.
-            // A ray beside a solid that seems to begin outside meets its black back: one of some forty.
-            assert!(area == 0.0 || object.0 > 6 || (h[1] - 200.0).abs() < 6.0, "{h:?} on {object:?}");
+            assert!(area == 0.0 || object.0 > 6 || (h[1] - 200.0).abs() < 4.0, "{h:?} on {object:?}");
             defect += area * f64::from((h[1] - 200.0).abs());
             whole += area * 200.0;
         }
