@@ -240,9 +240,8 @@ impl<'a> Walk<'a> {
                 Some(Between::Nothing) => self.clear((a, b), far, false),
                 Some(Between::All) => self.choices.blocked += 1,
                 Some(Between::Some(bodies)) => {
-                    let tolerance = self.tolerance(a, b);
-                    let (whole, _) = clear(a, b, far, WHOLE * tolerance, false);
-                    match gallery.mixed((k, number), bodies, whole, (tolerance - whole.error).max(0.5 * tolerance)) {
+                    let (whole, tolerance) = self.whole((a, b), far, false);
+                    match gallery.mixed((k, number), bodies, whole, tolerance) {
                         Some(found) => {
                             self.choices.clipped += 1;
                             self.add((a, b), found);
@@ -307,6 +306,14 @@ impl<'a> Walk<'a> {
         self.options.accuracy * (area * other / (times * of_surface)).max(LEAST * area.min(other))
     }
 
+    /// What two parts exchange if nothing stands between, and the error that what is left of it past panels may have: the whole is asked
+    /// for little more exactly than that.
+    fn whole(&self, (a, b): (&Part, &Part), far: Exchange, is_cut: bool) -> (Exchange, f64) {
+        let tolerance = self.tolerance(a, b);
+        let (whole, _) = clear(a, b, far, WHOLE * tolerance, is_cut);
+        (whole, (tolerance - whole.error).max(0.5 * tolerance))
+    }
+
     /// A part and what it looks at.
     fn pair(&mut self, part: usize, target: &mut Target) {
         let (a, b) = (&self.clusters.parts[part], target.inner);
@@ -335,10 +342,7 @@ impl<'a> Walk<'a> {
             return self.clear((a, b), far, is_cut);
         }
         self.choices.clipped += 1;
-        let tolerance = self.tolerance(a, b);
-        // Past panels the whole is asked for little more exactly than what is left of it.
-        let (whole, _) = clear(a, b, far, WHOLE * tolerance, is_cut);
-        let tolerance = (tolerance - whole.error).max(0.5 * tolerance);
+        let (whole, tolerance) = self.whole((a, b), far, is_cut);
         let scratch = (&mut self.shadows, &mut self.sights);
         let found = target.stage.as_mut().and_then(|stage| stage.mixed(scratch, a, &list, whole, tolerance));
         // Too thin a strip sees the other, or too much stands between for a list.
