@@ -7,11 +7,11 @@ use crate::judge::{Judge, WrittenRound};
 use crate::{Error, Monitor, Solution, stations};
 use radiosity_scene::{Bands, Side};
 use radiosity_trace::Tracer;
-use radiosity_view::Audit;
 use radiosity_view::lightmap::{
-    Atlas, Charts, Detail, Pooled, SeamInfo, SeamParams, SharedEdge, Texel, UnwrapInput, UnwrapParams, fill, fit_seams,
+    Atlas, Charts, Detail, SeamInfo, SeamParams, SharedEdge, Texel, UnwrapInput, UnwrapParams, fill, fit_seams,
     look_up, shared_edges,
 };
+use radiosity_view::{Audit, Pooled};
 use rayon::prelude::*;
 use std::collections::HashMap;
 

@@ -92,9 +92,7 @@ impl Solution<'_> {
 
     /// The field of light by element, in halves.
     pub(crate) fn field_of(&self, light: &[[Bands; 2]]) -> Field {
-        let mean = |[a, b]: &[Bands; 2]| std::array::from_fn(|band| 0.5 * (a[band] + b[band]));
-        let indirect: Vec<Bands> = light.iter().map(mean).collect();
-        Field::new(self.tracer().mesh, &self.elements, &indirect, &self.exposed_area())
+        Field::pooled(self.tracer().mesh, &self.elements, light, &self.exposed_area())
     }
 
     /// Relative standard error of the irradiance of cells that comes from the rows' sampling, by the difference of their

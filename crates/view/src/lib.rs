@@ -6,10 +6,12 @@
 pub mod audit;
 pub mod lightmap;
 pub mod picture;
+pub mod pool;
 pub mod reconstruct;
 pub mod referee;
 
 pub use audit::{Audit, Auditor};
 pub use picture::{Picture, ViewRays};
+pub use pool::Pooled;
 pub use reconstruct::{Field, Shared, shared_corner};
 pub use referee::Referee;

@@ -7,6 +7,7 @@
 //! so that no crack opens (catalogue 49, 61).
 
 mod corners;
+mod planes;
 
 use corners::{Cell, Corners};
 use glam::DVec2;
@@ -53,6 +54,19 @@ impl Field {
     pub fn new(mesh: &Mesh, elements: &Elements, values: &[Bands], weight: &[f64]) -> Field {
         let corners = Corners::new(mesh, elements);
         let values = corners.fitted(&Cell::all(elements, values, weight));
+        Field { base: corners.base, division: corners.division, values }
+    }
+
+    /// The same from two halves of the rays that found the values: cells of a plane share them first, as far as their light is
+    /// smooth.
+    pub fn pooled(mesh: &Mesh, elements: &Elements, halves: &[[Bands; 2]], weight: &[f64]) -> Field {
+        let corners = Corners::new(mesh, elements);
+        let mean = |[a, b]: &[Bands; 2]| std::array::from_fn(|band| 0.5 * (a[band] + b[band]));
+        let mut cells = Cell::all(elements, &halves.iter().map(mean).collect::<Vec<Bands>>(), weight);
+        for (cell, shared) in cells.iter_mut().zip(planes::shared(mesh, elements, halves, weight)) {
+            cell.value = shared.unwrap_or(cell.value);
+        }
+        let values = corners.fitted(&cells);
         Field { base: corners.base, division: corners.division, values }
     }
 

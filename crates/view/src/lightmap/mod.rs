@@ -20,15 +20,14 @@ mod fill;
 mod finer;
 mod flatten;
 mod pack;
-mod pool;
 mod seams;
+mod share;
 mod texels;
 
 pub use allot::{Allotment, Detail, GAIN, LOST};
 pub use edges::{SharedEdge, shared_edges};
 pub use fill::{fill, look_up};
 pub use flatten::Charts;
-pub use pool::Pooled;
 pub use seams::{SeamInfo, SeamParams, fit_seams};
 pub use texels::Texel;
 

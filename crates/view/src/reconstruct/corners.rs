@@ -1,5 +1,6 @@
 //! The values of lattice corners from those of the cells around them.
 
+use super::planes::FLAT;
 use super::{Shared, corner, edge_corner, edge_key, edge_of, for_each_cell, lattice, shared_corner, sides};
 use glam::DVec3;
 use radiosity_scene::{Bands, Elements, Mesh};
@@ -22,9 +23,6 @@ const SLIVER: f64 = 6.0;
 /// Larger are those whose cells are so many times as large. Without this, strips along walls and rugs, across which light does
 /// change, were made even: 4.4 % instead of 3.6 % in a furnished room.
 const LARGER: f64 = 4.0;
-
-/// Triangles lie on one plane where their normals differ by less than this cosine, of a degree.
-const FLAT: f64 = 0.9998;
 
 /// How often what lies across slivers is made equal: a sliver is some cells across.
 const EQUALIZED: usize = 4;
@@ -255,7 +253,7 @@ impl<'a> Corners<'a> {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Cell {
     weight: f64,
-    value: [f64; 3],
+    pub value: [f64; 3],
 }
 
 impl Cell {
