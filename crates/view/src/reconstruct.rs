@@ -10,6 +10,7 @@ mod corners;
 mod planes;
 
 use corners::{Cell, Corners};
+pub use planes::{Finding, Planes};
 use glam::DVec2;
 use radiosity_scene::{Bands, Elements, Mesh, Side};
 
