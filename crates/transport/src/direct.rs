@@ -93,17 +93,27 @@ pub struct Variation {
     pub variance: f32,
 }
 
-/// What is found at one place after the other of a receiver, and the room to work it out.
+/// A place of a receiver.
+#[derive(Clone, Copy)]
+struct Spot {
+    place: Place,
+    /// Where the dealing of its shadow rays begins, in [0, 1).
+    offset: f32,
+    /// Whether it lies inside a solid, where that was asked.
+    is_buried: Option<bool>,
+}
+
+/// The places of a receiver, what is found at one after the other, and the room to work it out.
 struct Scratch<'l> {
-    parts: Parts<'l>,
+    spots: Vec<Spot>,
+    /// What could give light to each of them, and room for more.
+    parts: Vec<Parts<'l>>,
     /// Shadow rays that each light has had at all places of the receiver.
     used: Vec<u32>,
     /// Result by light, lux per band.
     visible: Vec<[f64; 3]>,
     /// What became of the shadow rays at all places of the receiver.
     outcomes: u8,
-    /// Most parts at any of them.
-    most_parts: usize,
     /// Rays of a light from which on its visible share is a ratio.
     ratio: u32,
 }
@@ -189,14 +199,15 @@ impl Luminaires {
                 let i = chunk * CHUNK + k;
                 at.clear();
                 lit.clear();
-                self.at_places(tracer, receivers, (i, 0), shadowing, &mut scratch, |_, place, visible| {
+                self.go_to(receivers, (i, receivers.seed(i)), shadowing.places, &mut scratch);
+                scratch.look(tracer, receivers, (i, 0), shadowing.rays, |_, place, visible| {
                     at.push(*place);
                     lit.extend_from_slice(visible);
                 });
                 shaded[k] = scratch.outcomes & !CHANCE != LIT;
                 // Where all is lit or all is dark, what is seen from afar has the light of the whole.
                 let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
-                let near = receivers.near(i).filter(|_| mixed || scratch.most_parts > shadowing.rays as usize);
+                let near = receivers.near(i).filter(|_| mixed || scratch.most_parts() > shadowing.rays as usize);
                 let open: Vec<f64> = match near {
                     Some(near) => openness(tracer, &at, near, receivers.seed(i)),
                     None => vec![1.0; at.len()],
@@ -249,10 +260,11 @@ impl Luminaires {
             for (k, out) in out.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
                 let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
+                self.go_to(receivers, (i, hash(receivers.seed(i))), shadowing.places, &mut scratch);
                 for set in 1..3 {
-                    self.at_places(tracer, receivers, (i, set), shadowing, &mut scratch, |index, _, visible| {
+                    scratch.look(tracer, receivers, (i, set), shadowing.rays, |index, _, visible| {
                         let sum = visible.iter().map(|e| luminance_of(*e)).sum::<f64>();
-                        at[set as usize - 1][index as usize] = Some(sum);
+                        at[set as usize - 1][index] = Some(sum);
                     });
                     if scratch.outcomes == LIT || scratch.outcomes == DARK {
                         // There is no noise to keep apart.
@@ -298,63 +310,93 @@ impl Luminaires {
     fn scratch(&self, ratio: u32) -> Scratch<'_> {
         let lights = self.lights.len();
         Scratch {
-            parts: Parts::default(),
+            spots: Vec::new(),
+            parts: Vec::new(),
             used: vec![0; lights],
             visible: vec![[0.0; 3]; lights],
             outcomes: 0,
-            most_parts: 0,
             ratio,
         }
     }
 
-    /// Calls back with the number and the place for each place of a receiver that is not buried, and with what each light
-    /// gives there. The sets 1 and 2 are independent shadow rays at the same places, other ones than those of set 0.
-    fn at_places<'l>(
+    /// Goes to the places of a receiver that a seed tells, and finds what could give light there.
+    fn go_to<'l>(
         &'l self,
-        tracer: &Tracer,
         receivers: &impl Receivers,
-        (i, set): (usize, u32),
-        shadowing: &Shadowing,
-        scratch: &mut Scratch<'l>,
-        mut visit: impl FnMut(u32, &Place, &[[f64; 3]]),
+        (i, seed): (usize, u32),
+        wanted: u32,
+        Scratch { spots, parts, .. }: &mut Scratch<'l>,
     ) {
-        let seed = receivers.seed(i);
-        let places = Sequence::new(if set == 0 { seed } else { hash(seed) }, DIRECT);
-        scratch.used.fill(0);
-        scratch.outcomes = 0;
-        scratch.most_parts = 0;
+        spots.clear();
         let Some(site) = receivers.site(i) else { return };
-        let rays = receivers.rays(i, shadowing.rays);
-        for index in 0..receivers.places(i, shadowing.places) {
+        let places = Sequence::new(seed, DIRECT);
+        for index in 0..receivers.places(i, wanted) {
             let [offset, _, x, y] = places.point(index);
             let place = site.place(x, y);
-            scratch.parts.clear();
+            if parts.len() == spots.len() {
+                parts.push(Parts::default());
+            }
+            let parts = &mut parts[spots.len()];
+            parts.clear();
             for (l, light) in self.lights.iter().enumerate() {
-                scratch.parts.add(l, light, &place);
+                parts.add(l, light, &place);
             }
-            scratch.most_parts = scratch.most_parts.max(scratch.parts.len());
-            let (seed, offset) = match set {
-                0 => (seed, offset),
-                _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ index) ^ hash(set)))),
-            };
-            let outcome = scratch.shadow(tracer, &place, rays, (f64::from(offset), seed, index));
-            scratch.outcomes |= outcome;
-            // A place inside a solid is not a part of what is seen; one that is not has rays that get away.
-            if outcome & DARK == 0 || !receivers.buried(tracer, &place, hash(seed ^ index)) {
-                visit(index, &place, &scratch.visible);
-            }
+            spots.push(Spot { place, offset, is_buried: None });
         }
     }
 }
 
 impl Scratch<'_> {
-    /// What each light gives at a place, into `visible`; what became of the shadow rays.
-    fn shadow(&mut self, tracer: &Tracer, place: &Place, rays: u32, (offset, seed, index): (f64, u32, u32)) -> u8 {
+    /// Calls back with the number and the place for each place of a receiver that is not buried, and with what each light
+    /// gives there. The sets 1 and 2 are independent shadow rays at the same places, other ones than those of set 0.
+    fn look(
+        &mut self,
+        tracer: &Tracer,
+        receivers: &impl Receivers,
+        (i, set): (usize, u32),
+        rays: u32,
+        mut visit: impl FnMut(usize, &Place, &[[f64; 3]]),
+    ) {
+        let (seed, rays) = (receivers.seed(i), receivers.rays(i, rays));
+        self.used.fill(0);
+        self.outcomes = 0;
+        for index in 0..self.spots.len() {
+            let Spot { place, offset, is_buried } = self.spots[index];
+            if is_buried == Some(true) {
+                continue;
+            }
+            let number = index as u32;
+            let (own, offset) = match set {
+                0 => (seed, offset),
+                _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ number) ^ hash(set)))),
+            };
+            let outcome = self.shadow(tracer, index, rays, (f64::from(offset), own));
+            self.outcomes |= outcome;
+            // A place inside a solid is not a part of what is seen; from one that is not, some ray may get away.
+            if outcome & DARK != 0 && outcome & LIT == 0 && is_buried.is_none() {
+                let found = receivers.buried(tracer, &place, hash(own ^ number));
+                self.spots[index].is_buried = Some(found);
+                if found {
+                    continue;
+                }
+            }
+            visit(index, &place, &self.visible);
+        }
+    }
+
+    /// Most parts at any of the places.
+    fn most_parts(&self) -> usize {
+        self.parts[..self.spots.len()].iter().map(Parts::len).max().unwrap_or(0)
+    }
+
+    /// What each light gives at a place, by its number, into `visible`; what became of the shadow rays.
+    fn shadow(&mut self, tracer: &Tracer, index: usize, rays: u32, (offset, seed): (f64, u32)) -> u8 {
         self.visible.fill([0.0; 3]);
 
         // Deal the rays out: part l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average. Half of them go by what the parts
         // would give and half to all alike, as a lamp that had a ray now and then would sparkle in sunlight.
-        let Scratch { parts, used, visible, ratio, .. } = self;
+        let Scratch { spots, parts, used, visible, ratio, .. } = self;
+        let (place, parts) = (&spots[index].place, &parts[index]);
         let even = 0.5 * f64::from(rays) / parts.len() as f64;
         let (mut reached, mut outcomes) = (offset, 0);
         for (number, part) in parts.iter().enumerate() {
@@ -369,7 +411,7 @@ impl Scratch<'_> {
             }
             let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), used[l], n);
             used[l] += n;
-            let salt = hash(seed ^ hash(index ^ hash(number as u32)));
+            let salt = hash(seed ^ hash(index as u32 ^ hash(number as u32)));
             let (mut e, outcome) = parts.irradiance(part, tracer, place, samples, (*ratio, salt));
             if expected < 1.0 {
                 // It came about with this probability.
