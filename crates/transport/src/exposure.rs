@@ -3,8 +3,9 @@
 //!
 //! A place is buried when (nearly) all it sees is backs of one-sided surfaces. Radiosity of an element is meant as the
 //! mean over its exposed part, since only that part is ever seen; averaging in the buried part would darken the seams
-//! along every contact (the "shadow leaks" of lightmap bakers). A pilot finds elements that see backs at all; those are
-//! examined on an 8 × 8 grid, which keeps most samples out of the buried part; [`is_buried`] decides the rest.
+//! along every contact (the "shadow leaks" of lightmap bakers). A pilot finds elements with places that are buried; those are
+//! examined on a grid, more finely along the border of what is buried, which keeps most samples out of the buried part;
+//! [`is_buried`] decides the rest.
 
 use radiosity_scene::{Elements, Mesh};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame};
@@ -22,9 +23,10 @@ const PILOT: u32 = 8;
 /// The stream of sample points that exposure uses.
 const EXPOSURE: u32 = 0x0e59;
 
-/// Places along a side of an element that are examined; coarsely.
+/// Places along a side of an element that are told apart; and those that are examined wherever they lie.
 const FINE: u32 = 8;
 const COARSE: u32 = 4;
+const WIDE: u32 = FINE / COARSE;
 
 /// Rays that examine one place.
 const PROBE: u32 = 8;
@@ -71,10 +73,10 @@ impl Exposure {
         elements: &Elements,
         progress: &impl Progress,
     ) -> Result<Exposure, Stopped> {
-        Exposure::examined(tracer, (mesh, elements), FINE, progress)
+        Exposure::examined(tracer, (mesh, elements), true, progress)
     }
 
-    /// The same at a quarter of the places, for elements that are only looked up: what the mask leaves is rejected place by place.
+    /// The same without the finer places, for elements that are only looked up: what the mask leaves is rejected place by place.
     ///
     /// # Errors
     /// [`Stopped`] if `progress` says so.
@@ -84,13 +86,13 @@ impl Exposure {
         elements: &Elements,
         progress: &impl Progress,
     ) -> Result<Exposure, Stopped> {
-        Exposure::examined(tracer, (mesh, elements), COARSE, progress)
+        Exposure::examined(tracer, (mesh, elements), false, progress)
     }
 
     fn examined(
         tracer: &Tracer,
         (mesh, elements): (&Mesh, &Elements),
-        grid: u32,
+        is_fine: bool,
         progress: &impl Progress,
     ) -> Result<Exposure, Stopped> {
         const CHUNK: usize = 1024;
@@ -101,7 +103,7 @@ impl Exposure {
             .map(|chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(n);
                 let masks: Vec<_> =
-                    range.clone().flat_map(|cell| examine_cell(tracer, (mesh, elements), grid, cell)).collect();
+                    range.clone().flat_map(|cell| examine_cell(tracer, (mesh, elements), is_fine, cell)).collect();
                 let so_far = done.fetch_add(range.len(), std::sync::atomic::Ordering::Relaxed) + range.len();
                 progress.step(so_far, n).then_some(masks).ok_or(Stopped)
             })
@@ -155,26 +157,59 @@ fn nth_bit(mut mask: u64, n: u32) -> u32 {
     mask.trailing_zeros()
 }
 
-/// Whether a site may be buried in part: whether any of a few rays from it meets a back.
-fn is_suspect(tracer: &Tracer, site: &Site, sequence: &Sequence) -> bool {
+/// Which of a few rays from all over a site meet backs, one bit each.
+fn backs(tracer: &Tracer, site: &Site, sequence: &Sequence) -> u32 {
     let frame = frame(site.normal);
-    (0..PILOT).any(|i| {
+    (0..PILOT).fold(0, |backs, i| {
         let [u, v, x, y] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-        tracer.first(&tracer.ray(&site.place(x, y), direction, f64::INFINITY), i) == Found::Back
+        let found = tracer.first(&tracer.ray(&site.place(x, y), direction, f64::INFINITY), i);
+        backs | u32::from(found == Found::Back) << i
     })
 }
 
-/// The mask of a suspect element, by a place in each cell of a grid with so many along a side.
-fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, grid: u32) -> u64 {
-    let wide = FINE / grid;
-    let block = (0..wide).fold(0u64, |block, row| block | ((1 << wide) - 1) << (FINE * row));
-    (0..grid * grid).fold(0, |mask, cell| {
-        let [dx, dy, _, _] = sequence.point(PILOT + cell);
-        let (column, row) = (cell % grid, cell / grid);
+/// Whether a site may be buried in part: whether one of the places is from where rays met backs. Most of these are only seen
+/// from afar: in a furnished office four of five elements that see backs have no such place.
+fn is_suspect(tracer: &Tracer, site: &Site, sequence: &Sequence, backs: u32) -> bool {
+    (0..PILOT).filter(|i| backs >> i & 1 == 1).any(|i| {
+        let [_, _, x, y] = sequence.point(i);
+        is_buried(tracer, &site.place(x, y), i)
+    })
+}
+
+/// The mask of a suspect element.
+fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, is_fine: bool, backs: u32) -> u64 {
+    // The first places are those of the coarse grid, the next ones those of the fine one.
+    let is_open = |(column, row): (u32, u32), grid: u32, number: u32| {
+        let [dx, dy, _, _] = sequence.point(PILOT + number);
         let place = site.place((column as f32 + dx) / grid as f32, (row as f32 + dy) / grid as f32);
-        let is_open = !is_buried(tracer, &place, element ^ cell << 24);
-        if is_open { mask | block << (wide * (FINE * row + column)) } else { mask }
+        !is_buried(tracer, &place, element ^ number << 24)
+    };
+    let fine = |column: u32, row: u32| is_open((column, row), FINE, COARSE * COARSE + FINE * row + column);
+
+    // What is buried as far as its corners, and wherever the pilot was, is so all over.
+    let ends = [0, FINE - 1];
+    if backs.count_ones() >= BURIED && ends.iter().all(|row| ends.iter().all(|column| !fine(*column, *row))) {
+        return 0;
+    }
+
+    let coarse = (0..COARSE * COARSE).fold(0u32, |coarse, number| {
+        coarse | u32::from(is_open((number % COARSE, number / COARSE), COARSE, number)) << number
+    });
+    let is_coarse_open = |column: u32, row: u32| coarse >> (COARSE * row + column) & 1 == 1;
+    let is_at_border = |column: u32, row: u32| {
+        let around = |at: u32| at.saturating_sub(1)..(at + 2).min(COARSE);
+        let own = is_coarse_open(column, row);
+        around(row).any(|row| around(column).any(|column| is_coarse_open(column, row) != own))
+    };
+    (0..FINE * FINE).fold(0, |mask, number| {
+        let (column, row) = (number % FINE, number / FINE);
+        let block = (column / WIDE, row / WIDE);
+        let is_open = match is_fine && is_at_border(block.0, block.1) {
+            true => fine(column, row),
+            false => is_coarse_open(block.0, block.1),
+        };
+        mask | u64::from(is_open) << number
     })
 }
 
@@ -182,24 +217,26 @@ fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, grid
 const LEAST_SHARE: f64 = 0.125;
 
 /// The masks of the elements of a cell that are not wholly exposed.
-fn examine_cell(tracer: &Tracer, (mesh, elements): (&Mesh, &Elements), grid: u32, cell: usize) -> Vec<(u32, u64)> {
+fn examine_cell(tracer: &Tracer, (mesh, elements): (&Mesh, &Elements), is_fine: bool, cell: usize) -> Vec<(u32, u64)> {
     let ids = elements.of_cell(cell);
     if elements.share(mesh, ids.start) * (ids.len() as f64) < LEAST_SHARE {
         return Vec::new();
     }
     let whole = Site::new(mesh, elements, ids.start, elements.cell_corners(cell), u64::MAX);
     let sequence = Sequence::new(ids.start, EXPOSURE);
-    if !is_suspect(tracer, &whole, &sequence) {
+    let met = backs(tracer, &whole, &sequence);
+    if !is_suspect(tracer, &whole, &sequence, met) {
         return Vec::new();
     }
     let divided = ids.len() > 1;
     ids.filter_map(|element| {
         let site = Site::new(mesh, elements, element, elements.corners(element), u64::MAX);
         let sequence = Sequence::new(element, EXPOSURE);
-        if divided && !is_suspect(tracer, &site, &sequence) {
+        let met = if divided { backs(tracer, &site, &sequence) } else { met };
+        if divided && !is_suspect(tracer, &site, &sequence, met) {
             return None;
         }
-        let mask = examine(tracer, &site, &sequence, element, grid);
+        let mask = examine(tracer, &site, &sequence, element, is_fine, met);
         (mask != u64::MAX).then_some((element, mask))
     })
     .collect()
