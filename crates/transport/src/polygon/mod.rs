@@ -159,13 +159,17 @@ const BELOW: [f64; 7] = [
     0.0018314859458057275,
 ];
 
-/// A point of a spherical triangle, uniform by solid angle (Arvo 1995, "Stratified sampling of spherical triangles").
+/// A point of a spherical triangle, uniform by solid angle (Arvo 1995, "Stratified sampling of spherical triangles"). All of
+/// it comes from products of the corners, with one arc tangent for the solid angle (Van Oosterom and Strackee 1983): the
+/// three angles of the triangle are never asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct SphericalTriangle {
     a: DVec3,
     b: DVec3,
-    c: DVec3,
-    alpha: f64,
+    /// Unit, at a right angle to a and towards c.
+    towards_c: DVec3,
+    sin_alpha: f64,
+    cos_alpha: f64,
     cos_c: f64,
     /// Solid angle, steradian.
     pub solid_angle: f64,
@@ -175,29 +179,70 @@ impl SphericalTriangle {
     /// The triangle `corners` as seen from `point`; `None` where it degenerates.
     pub fn new(point: DVec3, corners: [DVec3; 3]) -> Option<SphericalTriangle> {
         let [a, b, c] = corners.map(|p| (p - point).normalize_or_zero());
-        let (n_ab, n_bc, n_ca) = (a.cross(b), b.cross(c), c.cross(a));
-        let (ab, bc, ca) = (n_ab.try_normalize()?, n_bc.try_normalize()?, n_ca.try_normalize()?);
-        let angle = |x: DVec3, y: DVec3| (-x.dot(y)).clamp(-1.0, 1.0).acos();
-        let (alpha, beta, gamma) = (angle(ab, ca), angle(ab, bc), angle(bc, ca));
-        let solid_angle = alpha + beta + gamma - std::f64::consts::PI;
-        (solid_angle > 0.0).then_some(SphericalTriangle { a, b, c, alpha, cos_c: a.dot(b), solid_angle })
+        let (ab, bc, ca) = (a.dot(b), b.dot(c), c.dot(a));
+        // Of the sides the parts at a right angle to a; by differences, which small triangles have all their digits in.
+        let (to_b, to_c) = ((b - a) - (ab - 1.0) * a, (c - a) - (ca - 1.0) * a);
+        let volume = a.dot((b - a).cross(c - a)).abs();
+        let (squares, squared) = (to_b.length_squared() * to_c.length_squared(), to_c.length_squared());
+        if volume <= 0.0 || squares <= 0.0 {
+            return None;
+        }
+        let lengths = squares.sqrt();
+        Some(SphericalTriangle {
+            a,
+            b,
+            towards_c: to_c / squared.sqrt(),
+            sin_alpha: volume / lengths,
+            cos_alpha: to_b.dot(to_c) / lengths,
+            cos_c: ab,
+            solid_angle: 2.0 * arc_tangent(volume, 1.0 + ab + bc + ca),
+        })
     }
 
     /// The unit direction that (x, y) in the unit square maps to.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
-        let area = x * self.solid_angle;
-        let (s, t) = (area - self.alpha).sin_cos();
-        let (sin_alpha, cos_alpha) = self.alpha.sin_cos();
+        let SphericalTriangle { a, b, towards_c, sin_alpha, cos_alpha, cos_c, solid_angle } = *self;
+        // Sine and cosine of the part of the solid angle less alpha.
+        let (sine, cosine) = sine_cosine(x * solid_angle);
+        let (s, t) = (sine * cos_alpha - cosine * sin_alpha, cosine * cos_alpha + sine * sin_alpha);
         let u = t - cos_alpha;
-        let v = s + sin_alpha * self.cos_c;
+        let v = s + sin_alpha * cos_c;
         let denominator = (v * s + u * t) * sin_alpha;
         let q =
             if denominator == 0.0 { 1.0 } else { (((v * t - u * s) * cos_alpha - v) / denominator).clamp(-1.0, 1.0) };
-        let orthogonal = |x: DVec3, y: DVec3| (x - x.dot(y) * y).normalize_or_zero();
-        let c = q * self.a + (1.0 - q * q).max(0.0).sqrt() * orthogonal(self.c, self.a);
-        let z = 1.0 - y * (1.0 - c.dot(self.b));
-        z * self.b + (1.0 - z * z).max(0.0).sqrt() * orthogonal(c, self.b)
+        let c = q * a + (1.0 - q * q).max(0.0).sqrt() * towards_c;
+        let z = 1.0 - y * (1.0 - c.dot(b));
+        z * b + (1.0 - z * z).max(0.0).sqrt() * (c - c.dot(b) * b).normalize_or_zero()
     }
+}
+
+/// Angles up to this are worked out by series that are good to 1e-15 there, others by the library.
+const SMALL: f64 = 0.25;
+
+/// The angle from 0 to π whose tangent is y/x, of y above zero.
+#[inline]
+fn arc_tangent(y: f64, x: f64) -> f64 {
+    if y > SMALL * x {
+        return y.atan2(x);
+    }
+    let tangent = y / x;
+    let square = tangent * tangent;
+    // 1/(2k + 1), of alternating sign.
+    let series = (0..12).rev().fold(0.0, |sum, k| 1.0 / f64::from(2 * k + 1) - square * sum);
+    tangent * series
+}
+
+/// Sine and cosine of an angle.
+#[inline]
+fn sine_cosine(angle: f64) -> (f64, f64) {
+    if angle.abs() > SMALL {
+        return angle.sin_cos();
+    }
+    let square = angle * angle;
+    let series = |of: [f64; 6]| of.iter().rev().fold(0.0, |sum, c| c - square * sum);
+    let sine = series([1.0, 1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0, 1.0 / 362_880.0, 1.0 / 39_916_800.0]);
+    let cosine = series([1.0, 0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40_320.0, 1.0 / 3_628_800.0]);
+    (angle * sine, cosine)
 }
 
 /// Least density of a corner relative to the highest: what lies at or below the horizon is still drawn now and then,
@@ -220,7 +265,7 @@ impl CosineTriangle {
     pub fn new(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> Option<CosineTriangle> {
         let triangle = SphericalTriangle::new(point, corners)?;
         // Directions run from corner b (y = 0) to the edge from a (x = 0) to c (x = 1).
-        let cosines = [triangle.b, triangle.b, triangle.a, triangle.c].map(|d| d.dot(normal).max(0.0));
+        let cosines = [triangle.b, triangle.b, triangle.a, (corners[2] - point).normalize_or_zero()].map(|d| d.dot(normal).max(0.0));
         let highest = cosines.iter().copied().fold(0.0, f64::max);
         if highest <= 0.0 {
             return None;
