@@ -166,6 +166,7 @@ const BELOW: [f64; 7] = [
 pub struct SphericalTriangle {
     a: DVec3,
     b: DVec3,
+    c: DVec3,
     /// Unit, at a right angle to a and towards c.
     towards_c: DVec3,
     sin_alpha: f64,
@@ -191,6 +192,7 @@ impl SphericalTriangle {
         Some(SphericalTriangle {
             a,
             b,
+            c,
             towards_c: to_c / squared.sqrt(),
             sin_alpha: volume / lengths,
             cos_alpha: to_b.dot(to_c) / lengths,
@@ -201,7 +203,7 @@ impl SphericalTriangle {
 
     /// The unit direction that (x, y) in the unit square maps to.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
-        let SphericalTriangle { a, b, towards_c, sin_alpha, cos_alpha, cos_c, solid_angle } = *self;
+        let SphericalTriangle { a, b, towards_c, sin_alpha, cos_alpha, cos_c, solid_angle, .. } = *self;
         // Sine and cosine of the part of the solid angle less alpha.
         let (sine, cosine) = sine_cosine(x * solid_angle);
         let (s, t) = (sine * cos_alpha - cosine * sin_alpha, cosine * cos_alpha + sine * sin_alpha);
@@ -265,7 +267,7 @@ impl CosineTriangle {
     pub fn new(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> Option<CosineTriangle> {
         let triangle = SphericalTriangle::new(point, corners)?;
         // Directions run from corner b (y = 0) to the edge from a (x = 0) to c (x = 1).
-        let cosines = [triangle.b, triangle.b, triangle.a, (corners[2] - point).normalize_or_zero()].map(|d| d.dot(normal).max(0.0));
+        let cosines = [triangle.b, triangle.b, triangle.a, triangle.c].map(|d| d.dot(normal).max(0.0));
         let highest = cosines.iter().copied().fold(0.0, f64::max);
         if highest <= 0.0 {
             return None;
