@@ -99,6 +99,8 @@ struct Spot {
     place: Place,
     /// Where the dealing of its shadow rays begins, in [0, 1).
     offset: f32,
+    /// What became of its shadow rays.
+    outcome: u8,
     /// Whether it lies inside a solid, where that was asked.
     is_buried: Option<bool>,
 }
@@ -110,7 +112,7 @@ struct Scratch<'l> {
     parts: Vec<Parts<'l>>,
     /// Shadow rays that each light has had at all places of the receiver.
     used: Vec<u32>,
-    /// Result by light, lux per band.
+    /// Result by place and light, lux per band.
     visible: Vec<[f64; 3]>,
     /// What became of the shadow rays at all places of the receiver.
     outcomes: u8,
@@ -207,7 +209,9 @@ impl Luminaires {
                 shaded[k] = scratch.outcomes & !CHANCE != LIT;
                 // Where all is lit or all is dark, what is seen from afar has the light of the whole.
                 let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
-                let near = receivers.near(i).filter(|_| mixed || scratch.most_parts() > shadowing.rays as usize);
+                let is_lit = scratch.outcomes & LIT != 0;
+                let is_uneven = mixed || is_lit && scratch.most_parts() > shadowing.rays as usize;
+                let near = receivers.near(i).filter(|_| is_uneven);
                 let open: Vec<f64> = match near {
                     Some(near) => openness(tracer, &at, near, receivers.seed(i)),
                     None => vec![1.0; at.len()],
@@ -297,8 +301,7 @@ impl Luminaires {
         seed: u32,
         parts: &mut Parts<'l>,
     ) -> [f64; 3] {
-        parts.clear();
-        parts.add(light, &self.lights[light], place);
+        parts.find_one(self, light, place);
         // The stream of places has no other use here.
         let pick = Sequence::new(seed, DIRECT).point(0)[0];
         let Some((part, probability)) = parts.pick(pick) else { return [0.0; 3] };
@@ -313,7 +316,7 @@ impl Luminaires {
             spots: Vec::new(),
             parts: Vec::new(),
             used: vec![0; lights],
-            visible: vec![[0.0; 3]; lights],
+            visible: Vec::new(),
             outcomes: 0,
             ratio,
         }
@@ -336,12 +339,8 @@ impl Luminaires {
             if parts.len() == spots.len() {
                 parts.push(Parts::default());
             }
-            let parts = &mut parts[spots.len()];
-            parts.clear();
-            for (l, light) in self.lights.iter().enumerate() {
-                parts.add(l, light, &place);
-            }
-            spots.push(Spot { place, offset, is_buried: None });
+            parts[spots.len()].find(self, &place);
+            spots.push(Spot { place, offset, outcome: 0, is_buried: None });
         }
     }
 }
@@ -358,29 +357,36 @@ impl Scratch<'_> {
         mut visit: impl FnMut(usize, &Place, &[[f64; 3]]),
     ) {
         let (seed, rays) = (receivers.seed(i), receivers.rays(i, rays));
+        let own = if set == 0 { seed } else { hash(seed ^ hash(set)) };
+        let lights = self.used.len();
         self.used.fill(0);
         self.outcomes = 0;
+        self.visible.clear();
+        self.visible.resize(self.spots.len() * lights, [0.0; 3]);
         for index in 0..self.spots.len() {
-            let Spot { place, offset, is_buried } = self.spots[index];
-            if is_buried == Some(true) {
+            if self.spots[index].is_buried == Some(true) {
                 continue;
             }
-            let number = index as u32;
-            let (own, offset) = match set {
-                0 => (seed, offset),
-                _ => (hash(seed ^ hash(set)), unit(hash(hash(seed ^ number) ^ hash(set)))),
+            let offset = match set {
+                0 => self.spots[index].offset,
+                _ => unit(hash(hash(seed ^ index as u32) ^ hash(set))),
             };
             let outcome = self.shadow(tracer, index, rays, (f64::from(offset), own));
+            self.spots[index].outcome = outcome;
             self.outcomes |= outcome;
-            // A place inside a solid is not a part of what is seen; from one that is not, some ray may get away.
-            if outcome & DARK != 0 && outcome & LIT == 0 && is_buried.is_none() {
-                let found = receivers.buried(tracer, &place, hash(own ^ number));
-                self.spots[index].is_buried = Some(found);
-                if found {
-                    continue;
-                }
+        }
+
+        // A place inside a solid is not a part of what is seen. From one that is not, some ray may get away; and where none does
+        // from any place, the mean is nothing over whichever of them.
+        let may_count = self.outcomes & LIT != 0;
+        for (index, spot) in self.spots.iter_mut().enumerate() {
+            if may_count && spot.outcome & DARK != 0 && spot.outcome & LIT == 0 {
+                let is_buried = || receivers.buried(tracer, &spot.place, hash(own ^ index as u32));
+                spot.is_buried = Some(spot.is_buried.unwrap_or_else(is_buried));
             }
-            visit(index, &place, &self.visible);
+            if spot.is_buried != Some(true) {
+                visit(index, &spot.place, &self.visible[index * lights..][..lights]);
+            }
         }
     }
 
@@ -389,14 +395,13 @@ impl Scratch<'_> {
         self.parts[..self.spots.len()].iter().map(Parts::len).max().unwrap_or(0)
     }
 
-    /// What each light gives at a place, by its number, into `visible`; what became of the shadow rays.
+    /// Adds what each light gives at a place, by its number, to `visible`; what became of the shadow rays.
     fn shadow(&mut self, tracer: &Tracer, index: usize, rays: u32, (offset, seed): (f64, u32)) -> u8 {
-        self.visible.fill([0.0; 3]);
-
         // Deal the rays out: part l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average. Half of them go by what the parts
         // would give and half to all alike, as a lamp that had a ray now and then would sparkle in sunlight.
         let Scratch { spots, parts, used, visible, ratio, .. } = self;
         let (place, parts) = (&spots[index].place, &parts[index]);
+        let visible = &mut visible[index * used.len()..][..used.len()];
         let even = 0.5 * f64::from(rays) / parts.len() as f64;
         let (mut reached, mut outcomes) = (offset, 0);
         for (number, part) in parts.iter().enumerate() {

@@ -28,15 +28,15 @@ const FINE: u32 = 8;
 const COARSE: u32 = 4;
 const WIDE: u32 = FINE / COARSE;
 
-/// Rays that examine one place.
+/// Rays that examine one place; the first one settles it where it meets no back.
 const PROBE: u32 = 8;
 
 /// A place is buried when at least this many of its probe rays meet backs. One of eight may slip through a gap
 /// between solids that touch.
 const BURIED: u32 = 7;
 
-/// Whether a place is buried in a solid. To be asked where a ray has met a back already; exposed places answer after
-/// two or three rays.
+/// Whether a place is buried in a solid. To be asked where there is reason to think so; exposed places answer after
+/// one ray, or two or three where it meets a back.
 pub fn is_buried(tracer: &Tracer, place: &Place, seed: u32) -> bool {
     let frame = frame(place.normal);
     let sequence = Sequence::new(seed, 0x0b0b);
@@ -45,7 +45,7 @@ pub fn is_buried(tracer: &Tracer, place: &Place, seed: u32) -> bool {
         let [u, v, _, _] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
         missed += u32::from(tracer.first(&tracer.ray(place, direction, f64::INFINITY), seed ^ i) != Found::Back);
-        if missed > PROBE - BURIED {
+        if missed > if i == 0 { 0 } else { PROBE - BURIED } {
             return false;
         }
     }

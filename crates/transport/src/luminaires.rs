@@ -64,6 +64,14 @@ impl Light {
             Light::Point(light) => &light.name,
         }
     }
+
+    /// Its triangles, if it has no tree of them.
+    pub(crate) fn few(&self) -> &[Piece] {
+        match self {
+            Light::Area { pieces, tree: None, .. } => pieces,
+            _ => &[],
+        }
+    }
 }
 
 /// All lights that are evaluated directly.
@@ -71,6 +79,8 @@ impl Light {
 pub struct Luminaires {
     /// The lights.
     pub lights: Vec<Light>,
+    /// The triangles of all lights without a tree, one after the other: lamps of two triangles would leave half of the lanes empty.
+    pub(crate) few: Vec<Four>,
     /// Exitance of each element (bands) that is counted through `lights` and must not be counted by rows as well.
     pub promoted: Vec<[f32; 4]>,
     /// Triangles by side whose whole emission is carried by `lights`.
@@ -141,7 +151,8 @@ impl Luminaires {
             }
         }
         lights.extend(scene.lights.iter().cloned().map(Light::Point));
-        Luminaires { lights, promoted, carried }
+        let few: Vec<[DVec3; 3]> = lights.iter().flat_map(Light::few).map(|piece| piece.corners).collect();
+        Luminaires { lights, few: few.chunks(4).map(Four::new).collect(), promoted, carried }
     }
 
     /// Lights that a scene has at most, told by its objects alone.

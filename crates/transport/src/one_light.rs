@@ -39,17 +39,16 @@ pub fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, n: u32, sa
     (arriving.map(|e| f64::from(e) * cosine * clear as f64 / f64::from(n)), outcome)
 }
 
-/// Unshadowed irradiance of a place from a light of few triangles; `factors` gets the luminance of each one's part.
-pub fn unshadowed((pieces, fours): (&[Piece], &[Four]), place: &Place, factors: &mut [f64]) -> [f64; 3] {
+/// Unshadowed irradiance of a place from a light of few triangles by their form factors; these come back as the luminance of
+/// each one's part.
+pub fn unshadowed(pieces: &[Piece], place: &Place, factors: &mut [f64]) -> [f64; 3] {
     let mut sum = [0f64; 3];
-    for ((pieces, four), out) in pieces.chunks(4).zip(fours).zip(factors.chunks_mut(4)) {
-        let seen = four.seen_from(place.point, place.normal);
-        for ((piece, factor), out) in pieces.iter().zip(seen).zip(out) {
-            *out = 0.0;
-            if factor > 0.0 && piece.triangle != place.triangle {
-                (0..3).for_each(|band| sum[band] += factor * f64::from(piece.exitance[band]));
-                *out = factor * f64::from(luminance(piece.exitance));
-            }
+    for (piece, factor) in pieces.iter().zip(factors) {
+        if *factor > 0.0 && piece.triangle != place.triangle {
+            (0..3).for_each(|band| sum[band] += *factor * f64::from(piece.exitance[band]));
+            *factor *= f64::from(luminance(piece.exitance));
+        } else {
+            *factor = 0.0;
         }
     }
     sum
@@ -75,8 +74,8 @@ pub fn from_few(
     let (mut visible, mut sampled) = ([0f64; 3], [0f64; 3]);
     let mut outcome = 0;
     for index in first..first + n {
-        let [u, v, _, _] = sequence.point(index);
-        let Some((piece, target, weight)) = sample_one((pieces, factors), place, [u, v].map(f64::from)) else {
+        let uv = sequence.pair(index).map(f64::from);
+        let Some((piece, target, weight)) = sample_one((pieces, factors), place, uv) else {
             continue;
         };
         let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
@@ -120,9 +119,9 @@ pub fn from_many(
         let mut u = f64::from(u);
         let Some((leaf, probability)) = tree.pick(node, place.point, place.normal, &mut u) else { continue };
         let range = tree.leaves()[leaf].start as usize..tree.leaves()[leaf].end as usize;
-        let mut factors = [0.0; 4];
         let own = &pieces[range];
-        if luminance_of(unshadowed((own, &fours[leaf..=leaf]), place, &mut factors[..own.len()])) <= 0.0 {
+        let mut factors = fours[leaf].seen_from(place.point, place.normal);
+        if luminance_of(unshadowed(own, place, &mut factors[..own.len()])) <= 0.0 {
             continue;
         }
         let Some((piece, target, weight)) = sample_one((own, &factors[..own.len()]), place, [u, f64::from(v)]) else {

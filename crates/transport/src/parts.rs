@@ -1,5 +1,6 @@
 //! What has shadow rays of its own at a place: a light, or of one with many triangles groups of them.
 
+use crate::Luminaires;
 use crate::luminaires::{Light, Piece};
 use crate::one_light::{Samples, from_few, from_many, from_point, luminance_of, unshadowed};
 use crate::polygon::Four;
@@ -39,22 +40,44 @@ pub struct Parts<'l> {
 }
 
 impl<'l> Parts<'l> {
-    /// Forgets all parts, for another place.
-    pub fn clear(&mut self) {
+    /// Those of all lights, at another place.
+    pub fn find(&mut self, luminaires: &'l Luminaires, place: &Place) {
+        self.clear();
+        for four in &luminaires.few {
+            self.factors.extend(four.seen_from(place.point, place.normal));
+        }
+        let mut first = 0;
+        for (number, light) in luminaires.lights.iter().enumerate() {
+            match light.few() {
+                [] => self.add(number, light, place),
+                pieces => {
+                    self.add_few(number, pieces, first, place);
+                    first += pieces.len();
+                }
+            }
+        }
+    }
+
+    /// Those of one light, by its number, at another place.
+    pub fn find_one(&mut self, luminaires: &'l Luminaires, number: usize, place: &Place) {
+        self.clear();
+        self.add(number, &luminaires.lights[number], place);
+    }
+
+    fn clear(&mut self) {
         self.list.clear();
         self.factors.clear();
         self.total = 0.0;
     }
 
-    /// Adds those of a light, by its number.
-    pub fn add(&mut self, number: usize, light: &'l Light, place: &Place) {
+    fn add(&mut self, number: usize, light: &'l Light, place: &Place) {
         match light {
             Light::Point(light) => {
                 let (direction, _, arriving) = light.arrival(place.point);
                 let cosine = direction.dot(place.normal).max(0.0);
                 self.push(number, cosine * f64::from(luminance(arriving)), What::Point(light));
             }
-            Light::Area { pieces, fours, tree: None, .. } => self.add_few(number, pieces, fours, place),
+            Light::Area { pieces, fours, tree: None, .. } => self.add_seen(number, pieces, fours, place),
             Light::Area { pieces, fours, tree: Some(tree), .. } => {
                 let mut cut = std::mem::take(&mut self.cut);
                 cut.clear();
@@ -63,7 +86,7 @@ impl<'l> Parts<'l> {
                     match tree.leaf(node) {
                         Some(leaf) => {
                             let own = &pieces[tree.leaves()[leaf].start as usize..tree.leaves()[leaf].end as usize];
-                            self.add_few(number, own, &fours[leaf..=leaf], place);
+                            self.add_seen(number, own, &fours[leaf..=leaf], place);
                         }
                         None => self.push(number, importance, What::Many(pieces, fours, tree, node)),
                     }
@@ -73,10 +96,17 @@ impl<'l> Parts<'l> {
         }
     }
 
-    fn add_few(&mut self, number: usize, pieces: &'l [Piece], fours: &[Four], place: &Place) {
+    fn add_seen(&mut self, number: usize, pieces: &'l [Piece], fours: &[Four], place: &Place) {
         let first = self.factors.len();
-        self.factors.resize(first + pieces.len(), 0.0);
-        let here = unshadowed((pieces, fours), place, &mut self.factors[first..]);
+        for four in fours {
+            self.factors.extend(four.seen_from(place.point, place.normal));
+        }
+        self.add_few(number, pieces, first, place);
+    }
+
+    /// Adds triangles whose form factors are known from `first` on.
+    fn add_few(&mut self, number: usize, pieces: &'l [Piece], first: usize, place: &Place) {
+        let here = unshadowed(pieces, place, &mut self.factors[first..][..pieces.len()]);
         self.push(number, luminance_of(here), What::Few(pieces, first, here));
     }
 
