@@ -312,14 +312,7 @@ impl Luminaires {
 
     fn scratch(&self, ratio: u32) -> Scratch<'_> {
         let lights = self.lights.len();
-        Scratch {
-            spots: Vec::new(),
-            parts: Vec::new(),
-            used: vec![0; lights],
-            visible: Vec::new(),
-            outcomes: 0,
-            ratio,
-        }
+        Scratch { spots: Vec::new(), parts: Vec::new(), used: vec![0; lights], visible: Vec::new(), outcomes: 0, ratio }
     }
 
     /// Goes to the places of a receiver that a seed tells, and finds what could give light there.

@@ -168,8 +168,8 @@ fn backs(tracer: &Tracer, site: &Site, sequence: &Sequence) -> u32 {
     })
 }
 
-/// Whether a site may be buried in part: whether one of the places is from where rays met backs. Most of these are only seen
-/// from afar: in a furnished office four of five elements that see backs have no such place.
+/// Whether a site may be buried in part: whether one of the places is from where rays met backs. Others see backs from
+/// afar only, and are not examined for that.
 fn is_suspect(tracer: &Tracer, site: &Site, sequence: &Sequence, backs: u32) -> bool {
     (0..PILOT).filter(|i| backs >> i & 1 == 1).any(|i| {
         let [_, _, x, y] = sequence.point(i);

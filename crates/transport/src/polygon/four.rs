@@ -109,7 +109,7 @@ fn contour((a, a_inverse): (Vectors, Lanes), (b, b_inverse): (Vectors, Lanes), n
     let cosine = dot(a, b) * inverse;
     let turned = dot(cross, normal);
     let acute = angle_over_sine(cosine.abs()) * inverse;
-    // Hardly any lamp is seen at such angles, and a root and a quotient are a third of the work.
+    // The root and the quotient are needed for obtuse angles only: those of lamps that are near.
     let Lanes([p, q, r, s]) = cosine;
     if !(p < 0.0 || q < 0.0 || r < 0.0 || s < 0.0) {
         return acute * turned;
