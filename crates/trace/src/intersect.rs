@@ -33,6 +33,9 @@ const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
 /// Rays and scenes reach no further than this, so that no product overflows.
 const LARGEST: f32 = (1u64 << 60) as f32;
 
+/// The axes across each, as seen along it and against it.
+const ACROSS: [[[usize; 2]; 2]; 3] = [[[1, 2], [2, 1]], [[2, 0], [0, 2]], [[0, 1], [1, 0]]];
+
 /// Smallest box around all triangles that have finite corners; `None` without one.
 pub(crate) fn bounds_of(triangles: &[[Vec3; 3]]) -> Option<[Vec3; 2]> {
     triangles
@@ -76,7 +79,7 @@ impl Prepared {
     }
 
     /// The same where backs are set back by `tie`.
-    #[inline]
+    #[inline(always)]
     pub fn with_tie(ray: &Ray, bounds: [Vec3; 2], tie: f32) -> Option<Prepared> {
         let [lo, hi] = bounds;
         let reach = (ray.origin - lo).abs().max((ray.origin - hi).abs()).max_element();
@@ -86,21 +89,14 @@ impl Prepared {
             return None;
         }
 
-        // The largest component becomes z; x and y change places where z looks backwards, which keeps the winding.
-        let z = if steep[0] > steep[1] {
-            if steep[0] > steep[2] { 0 } else { 2 }
-        } else if steep[1] > steep[2] {
-            1
-        } else {
-            2
-        };
+        // The largest component becomes z; x and y change places where z looks backwards, which keeps the winding. All
+        // without branches: where a ray goes nobody guesses.
+        let first = usize::from(steep[0] <= steep[1]);
+        let z = if steep[0].max(steep[1]) > steep[2] { first } else { 2 };
         if steep[z] < SMALLEST {
             return None;
         }
-        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
-        if d[z] < 0.0 {
-            std::mem::swap(&mut x, &mut y);
-        }
+        let [x, y] = ACROSS[z][usize::from(d[z] < 0.0)];
 
         let inverse = d.map(|d| 1.0 / d.abs().max(SMALLEST).copysign(d));
         let pad = reach * PAD;
@@ -114,7 +110,7 @@ impl Prepared {
             tie,
             inverse,
             pad: inverse.map(|i| pad * i.abs()),
-            near: std::array::from_fn(|axis| if d[axis].is_sign_negative() { axis + 3 } else { axis }),
+            near: std::array::from_fn(|axis| axis + 3 * usize::from(d[axis].is_sign_negative())),
         })
     }
 

@@ -236,13 +236,12 @@ impl Tree {
     /// through the others. `accept` may be asked about hits behind the nearest one, and in any order.
     #[inline]
     pub fn closest_where(&self, ray: &Ray, mut accept: impl FnMut(u32, f32, f32, bool) -> bool) -> Option<Hit> {
-        let prepared = Prepared::with_tie(ray, self.bounds?, self.tie)?;
         #[cfg(target_arch = "x86_64")]
         if self.simd {
             // SAFETY: `simd` is set only where the processor has AVX2 and FMA.
-            return unsafe { crate::avx2::closest(self, &prepared, &mut accept) };
+            return unsafe { crate::avx2::closest(self, ray, &mut accept) };
         }
-        portable::closest(self, &prepared, &mut accept)
+        portable::closest(self, &self.prepared(ray)?, &mut accept)
     }
 
     /// Whether anything is hit.
@@ -253,15 +252,18 @@ impl Tree {
     /// Whether anything is hit that `accept` (triangle, weights of its corners 1 and 2, back) does not refuse.
     #[inline]
     pub fn blocked_where(&self, ray: &Ray, mut accept: impl FnMut(u32, f32, f32, bool) -> bool) -> bool {
-        let Some(prepared) = self.bounds.and_then(|bounds| Prepared::with_tie(ray, bounds, self.tie)) else {
-            return false;
-        };
         #[cfg(target_arch = "x86_64")]
         if self.simd {
             // SAFETY: `simd` is set only where the processor has AVX2 and FMA.
-            return unsafe { crate::avx2::blocked(self, &prepared, &mut accept) };
+            return unsafe { crate::avx2::blocked(self, ray, &mut accept) };
         }
-        portable::blocked(self, &prepared, &mut accept)
+        self.prepared(ray).is_some_and(|prepared| portable::blocked(self, &prepared, &mut accept))
+    }
+
+    /// `None` where a ray cannot hit anything. Inlined, so that `avx2` has it in registers.
+    #[inline(always)]
+    pub(crate) fn prepared(&self, ray: &Ray) -> Option<Prepared> {
+        Prepared::with_tie(ray, self.bounds?, self.tie)
     }
 
     /// The nearest hit of each ray, on the caller's thread. Stops at the end of the shorter slice.
