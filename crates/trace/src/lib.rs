@@ -23,4 +23,4 @@ pub use tree::{Flaw, Tree};
 pub mod sampling;
 pub mod surface;
 
-pub use surface::{Found, Place, Tracer};
+pub use surface::{Fan, Found, Place, Tracer};

@@ -50,6 +50,26 @@ pub struct Place {
     pub triangle: u32,
 }
 
+/// What all rays from a place have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Fan {
+    origin: Vec3,
+    /// Normal of the place's triangle on the side of the place's own; none where nothing is known of it.
+    flat: Vec3,
+    triangle: u32,
+}
+
+impl Fan {
+    /// The ray in a direction that ends after `length` metres. It does not meet the triangle of the place, unless it goes
+    /// through it: a normal that is not the triangle's has directions that do, and whoever is inside of a smooth solid sees
+    /// nothing outside.
+    #[inline]
+    pub fn ray(&self, direction: Vec3, length: f32) -> Ray {
+        let skip = if self.flat.dot(direction) < 0.0 { u32::MAX } else { self.triangle };
+        Ray { origin: self.origin, direction, t_max: length, skip }
+    }
+}
+
 /// Who sees whom in one scene.
 pub struct Tracer<'a> {
     /// The scene.
@@ -63,6 +83,8 @@ pub struct Tracer<'a> {
     kind: Vec<Kind>,
     /// Unit normals of the triangles' fronts.
     normals: Vec<Vec3>,
+    /// Per triangle, the weight above which no hit is at an edge.
+    edge: Vec<f32>,
     all_opaque: bool,
 }
 
@@ -82,6 +104,10 @@ impl<'a> Tracer<'a> {
         // Around the origin single precision is finest, so the tree lives in coordinates about the scene's centre.
         let centre = if mesh.vertices.is_empty() { DVec3::ZERO } else { 0.5 * (low + high) };
         let half = if mesh.vertices.is_empty() { 1.0 } else { (0.5 * (high - low)).max_element() };
+        // Rounding a coordinate to single precision moves it by at most 2^-25 of its binade; interpolation and
+        // the intersection test add about as much again. Eight times that clears the surface with certainty and
+        // is still a few micrometres in a room.
+        let offset = half * 2f64.powi(-21);
         let kind: Vec<Kind> = mesh
             .source
             .par_iter()
@@ -103,19 +129,17 @@ impl<'a> Tracer<'a> {
             mesh,
             tree: Tree::over(mesh.triangles.len(), |t| mesh.corners(t).map(|p| (p - centre).as_vec3())),
             centre,
-            // Rounding a coordinate to single precision moves it by at most 2^-25 of its binade; interpolation and
-            // the intersection test add about as much again. Eight times that clears the surface with certainty and
-            // is still a few micrometres in a room.
-            offset: half * 2f64.powi(-21),
+            offset,
             all_opaque: kind.iter().all(|k| !k.see_through),
             kind,
             normals: (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t).as_vec3()).collect(),
+            edge: (0..mesh.triangles.len()).into_par_iter().map(|t| edge_weight(mesh.corners(t), offset)).collect(),
         }
     }
 
     /// Memory that it takes beside the scene and the mesh, bytes.
     pub fn bytes(&self) -> usize {
-        self.tree.memory() + size_of_val(&*self.kind) + size_of_val(&*self.normals)
+        self.tree.memory() + size_of_val(&*self.kind) + size_of_val(&*self.normals) + size_of_val(&*self.edge)
     }
 
     /// The tree of boxes (its coordinates are relative to the scene's centre).
@@ -133,17 +157,27 @@ impl<'a> Tracer<'a> {
         self.offset
     }
 
-    /// The ray that leaves a place in a direction and ends after `length` metres. It does not meet the triangle of the place,
-    /// unless it goes through it: a normal that is not the triangle's has directions that do, and whoever is inside of a
-    /// smooth solid sees nothing outside.
+    /// The rays that leave a place.
+    #[inline]
+    pub fn fan(&self, from: &Place) -> Fan {
+        let origin = from.point - self.centre + self.offset * from.normal;
+        let flat = self.normals.get(from.triangle as usize).map_or(Vec3::ZERO, |flat| {
+            let side = flat.dot(from.normal.as_vec3());
+            if side > 0.0 {
+                *flat
+            } else if side < 0.0 {
+                -*flat
+            } else {
+                Vec3::ZERO
+            }
+        });
+        Fan { origin: origin.as_vec3(), flat, triangle: from.triangle }
+    }
+
+    /// The ray that leaves a place in a direction and ends after `length` metres ([`Fan::ray`]).
     #[inline]
     pub fn ray(&self, from: &Place, direction: DVec3, length: f64) -> Ray {
-        let origin = from.point - self.centre + self.offset * from.normal;
-        let (normal, direction) = (from.normal.as_vec3(), direction.as_vec3());
-        let goes_through = |flat: &Vec3| flat.dot(normal) * flat.dot(direction) < 0.0;
-        let skip =
-            if self.normals.get(from.triangle as usize).is_some_and(goes_through) { u32::MAX } else { from.triangle };
-        Ray { origin: origin.as_vec3(), direction, t_max: length as f32, skip }
+        self.fan(from).ray(direction.as_vec3(), length as f32)
     }
 
     /// A ray that does not start on a surface: a camera's.
@@ -168,13 +202,11 @@ impl<'a> Tracer<'a> {
     #[inline]
     fn is_at_edge(&self, hit: &Hit) -> bool {
         let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-        if weights.iter().all(|w| *w > EDGE) {
+        if weights[0].min(weights[1]).min(weights[2]) > self.edge[hit.triangle as usize] {
             return false;
         }
-        let [a, b, c] = self.mesh.corners(hit.triangle as usize);
-        let doubled = (b - a).cross(c - a).length();
-        let opposite = [c - b, a - c, b - a];
-        (0..3).any(|i| f64::from(weights[i]) * doubled <= REACH * self.offset * opposite[i].length())
+        let (doubled, opposite) = extent(self.mesh.corners(hit.triangle as usize));
+        (0..3).any(|i| f64::from(weights[i]) * doubled <= REACH * self.offset * opposite[i])
     }
 
     /// At the foot of a wall its distance and that of the floor behind it are the same but for rounding. Then what lies on
@@ -259,6 +291,18 @@ impl<'a> Tracer<'a> {
         let opacity = self.scene.opacity(at);
         opacity >= 1.0 || (opacity > 0.0 && unit(hash(seed ^ hash(triangle))) < opacity)
     }
+}
+
+/// A triangle's doubled area, and the lengths of the edges opposite its corners.
+fn extent([a, b, c]: [DVec3; 3]) -> (f64, [f64; 3]) {
+    ((b - a).cross(c - a).length(), [(c - b).length(), (a - c).length(), (b - a).length()])
+}
+
+/// The weight above which no hit on a triangle is at an edge: that at its least height, and more than rounding takes from it.
+fn edge_weight(corners: [DVec3; 3], offset: f64) -> f32 {
+    let (doubled, opposite) = extent(corners);
+    let longest = opposite.into_iter().fold(0.0, f64::max);
+    EDGE.min((1.000_001 * REACH * offset * longest / doubled) as f32)
 }
 
 #[cfg(test)]
