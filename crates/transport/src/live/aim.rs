@@ -4,18 +4,14 @@
 //! of some cones are left out: for an armchair in a furnished room, of 64 rays of an element all but four. These are drawn as they were
 //! traced.
 
-use radiosity_trace::sampling::Sequence;
-use std::f32::consts::FRAC_PI_4;
-
-/// Rays that are looked at together.
-const WIDTH: usize = 8;
+use radiosity_trace::sampling::{EIGHT as WIDTH, Sequence, cosine_directions};
 
 /// Words of a bit for each ray of a row, at most.
 pub const MOST_WORDS: usize = 16;
 
-/// Slack for cosines of angles. A direction along the surface has its third part from 1 less two squares, which are off by up to
-/// 4e-7: it is off by the root of that, 6e-4.
-const SLACK: f32 = 1e-3;
+/// Slack for cosines of angles: directions, axes and the sums of products are off by 1e-6 together, and what rays are drawn by,
+/// [`cosine_direction`](radiosity_trace::sampling::cosine_direction), along the surface by the root of 1e-11.
+const SLACK: f32 = 1e-5;
 
 /// Directions in an element's frame.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +58,7 @@ fn all(sequence: &Sequence, first: u32, reached: &[f32], nearest: f32, aims: &[A
         // Past the last one nothing is as far.
         let mut far = [f32::NEG_INFINITY; WIDTH];
         far[..reached.len()].copy_from_slice(reached);
-        let [x, y, z] = directions(sequence.pairs(first + (block * WIDTH) as u32));
+        let [x, y, z] = cosine_directions::<WIDTH>(sequence.pairs(first + (block * WIDTH) as u32));
         let mut most = [f32::NEG_INFINITY; WIDTH];
         for Aim { axis, least } in aims {
             for k in 0..WIDTH {
@@ -77,29 +73,6 @@ fn all(sequence: &Sequence, first: u32, reached: &[f32], nearest: f32, aims: &[A
         bits[block * WIDTH / 64] |= own << (block * WIDTH % 64);
     }
     bits
-}
-
-/// Directions of places in the unit square as [`cosine_direction`](radiosity_trace::sampling::cosine_direction) has them, about the
-/// third axis.
-#[inline(always)]
-fn directions([u, v]: [[f32; WIDTH]; 2]) -> [[f32; WIDTH]; 3] {
-    let mut directions = [[0.0; WIDTH]; 3];
-    for k in 0..WIDTH {
-        let (a, b) = (2.0 * u[k] - 1.0, 2.0 * v[k] - 1.0);
-        let is_first = a * a > b * b;
-        let (long, short) = if is_first { (a, b) } else { (b, a) };
-        // In the middle both are nothing.
-        let angle = FRAC_PI_4 * (short / if long == 0.0 { 1.0 } else { long });
-        let q = angle * angle;
-        let sine = angle * (1.0 + q * (-1.0 / 6.0 + q * (1.0 / 120.0 + q * (-1.0 / 5040.0 + q / 362_880.0))));
-        let cosine = 1.0 + q * (-0.5 + q * (1.0 / 24.0 + q * (-1.0 / 720.0 + q / 40_320.0)));
-        let (x, y) = if is_first { (long * cosine, long * sine) } else { (long * sine, long * cosine) };
-        let square = 1.0 - x * x - y * y;
-        directions[0][k] = x;
-        directions[1][k] = y;
-        directions[2][k] = if square > 0.0 { square } else { 0.0 }.sqrt();
-    }
-    directions
 }
 
 #[cfg(test)]
@@ -139,26 +112,6 @@ mod tests {
             }
         }
         assert!(inside > 500 && found < inside + inside / 10 && found < all / 4, "{inside} {found} {all}");
-    }
-
-    /// At the rim of the square, whose directions are along the surface, and elsewhere.
-    #[test]
-    fn single_precision_is_as_good_as_is_said() {
-        const LAST: f32 = 1.0 - 1.0 / 16_777_216.0;
-        let mut worst: f64 = 0.0;
-        for k in 0..100_000u32 {
-            let x = f32::from_bits((hash(k) >> 9) | 0x3f80_0000) - 1.0;
-            let near = x.powi(8);
-            let [mut u, mut v] = [[x; WIDTH]; 2];
-            (u[0], v[1], u[2], v[3], u[4], v[5]) = (0.0, 0.0, LAST, LAST, near, LAST - near);
-            v[7] = f32::from_bits((hash(!k) >> 9) | 0x3f80_0000) - 1.0;
-            let found = directions([u, v]);
-            for k in 0..WIDTH {
-                let own = DVec3::from(found.map(|lanes| f64::from(lanes[k])));
-                worst = worst.max(own.distance(cosine_direction(&FRAME, f64::from(u[k]), f64::from(v[k]))));
-            }
-        }
-        assert!(worst > 1e-4 && worst < 0.8 * f64::from(SLACK), "{worst}");
     }
 
     #[test]
