@@ -302,9 +302,7 @@ impl Luminaires {
         parts: &mut Parts<'l>,
     ) -> [f64; 3] {
         parts.find_one(self, light, place);
-        // The stream of places has no other use here.
-        let pick = Sequence::new(seed, DIRECT).point(0)[0];
-        let Some((part, probability)) = parts.pick(pick) else { return [0.0; 3] };
+        let Some((part, probability)) = parts.pick(unit(hash(seed))) else { return [0.0; 3] };
         let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
         let (e, _) = parts.irradiance(part, tracer, place, (&sequence, 0, 1), (RATIO, seed));
         e.map(|e| e / probability)

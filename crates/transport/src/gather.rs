@@ -7,13 +7,12 @@
 
 use crate::parts::Parts;
 use crate::pilot::{AGAIN, Pilot};
-use crate::receivers::Site;
 use crate::rows::IdSpace;
 use crate::{Columns, Luminaires, Progress, Receivers, Stopped};
-use glam::{DVec2, DVec3};
+use glam::{DVec2, Vec3};
 use radiosity_scene::{Bands, Side, Surface, luminance};
-use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
-use radiosity_trace::{Found, Place, Tracer};
+use radiosity_trace::sampling::{EIGHT, Sequence, cosine_direction, cosine_directions, frame, hash, unit};
+use radiosity_trace::{Fan, Found, Place, Ray, Tracer};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -71,6 +70,7 @@ impl<'a> Gather<'a> {
         let n = receivers.len();
         let half_rays = rays.div_ceil(2).max(1) as u32;
         let peak = self.values.iter().map(|[r, g, b, _]| luminance([*r, *g, *b])).fold(0.0, f32::max).into();
+        let caster = Caster { gather: self, looked_up: self.looked_up() };
         let done = AtomicUsize::new(0);
         let mut means = vec![[[0f32; 3]; 2]; n];
         means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
@@ -80,26 +80,34 @@ impl<'a> Gather<'a> {
                 let i = chunk * CHUNK + k;
                 receivers.site(i).map(|site| (receivers.seed(i), site))
             };
-            let mut parts = Parts::default();
-            let mut cast = |site: &Site, [u, v, x, y]: [f32; 4], salt: u32| {
-                let place = site.place(x, y);
-                let direction = cosine_direction(&frame(place.normal), f64::from(u), f64::from(v));
-                self.arriving(&place, direction, salt, &mut parts)
-            };
+            let (mut parts, mut volley) = (Parts::default(), Volley::default());
             for k in 0..means.len() {
                 let Some((seed, site)) = own(k) else { continue };
-                let sequence = Sequence::new(seed, GATHER);
+                let (sequence, salt) = (Sequence::new(seed, GATHER), hash(seed));
+                let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
+                volley.aim(&sequence, 2 * half_rays);
+                let Volley { points, directions, order, light } = &mut volley;
+                for &index in &*order {
+                    let above = only.unwrap_or_else(|| {
+                        let [_, _, x, y] = sequence.point(index);
+                        Hemisphere::new(self.tracer, &site.place(x, y))
+                    });
+                    let ray = above.ray(directions[index as usize]);
+                    light[index as usize] = caster.arriving(&ray, hash(salt ^ index), &mut parts);
+                }
                 pilot.place(k, &site, 2 * half_rays);
-                for index in 0..2 * half_rays {
-                    let point = sequence.point(index);
-                    let half = usize::from(index >= half_rays);
-                    pilot.add(k, half, point, cast(&site, point, hash(hash(seed) ^ index)));
+                for (index, (point, light)) in points.iter().zip(light).enumerate() {
+                    pilot.add(k, usize::from(index >= half_rays as usize), *point, *light);
                 }
             }
             for (k, mean) in means.iter_mut().enumerate() {
                 let Some((seed, site)) = own(k) else { continue };
-                *mean = pilot.mean(k, (&Sequence::new(seed, AGAIN), 0), |index, point| {
-                    cast(&site, point, hash(hash(seed ^ AGAIN) ^ index))
+                let (sequence, salt) = (Sequence::new(seed, AGAIN), hash(seed ^ AGAIN));
+                let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
+                *mean = pilot.mean(k, (&sequence, 0), |index, [u, v, x, y]| {
+                    let above = only.unwrap_or_else(|| Hemisphere::new(self.tracer, &site.place(x, y)));
+                    let ray = above.ray(cosine_directions([[u], [v]]).map(|[x]| x));
+                    caster.arriving(&ray, hash(salt ^ index), &mut parts)
                 });
             }
             let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
@@ -108,57 +116,167 @@ impl<'a> Gather<'a> {
         Ok(means)
     }
 
-    /// Radiosity that arrives at a place from a direction, without that of the luminaires.
-    fn arriving(&self, from: &Place, direction: DVec3, mut seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
-        let (mut place, mut direction) = (*from, direction);
-        let (mut sum, mut throughput) = ([0f64; 3], [1f64; 3]);
-        for bounce in 0.. {
-            let found = self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), seed);
-            let id = self.ids.id(found, direction);
-            let near = match found {
-                Found::Surface { triangle, uv, side, distance } if bounce < DEEPEST && id != self.ids.nothing() => {
-                    let near = f64::from(distance) < near(self.area[id as usize]);
-                    near.then_some((triangle as usize, uv, side))
-                }
-                _ => None,
-            };
-            let value = self.values[id as usize];
-            let followed = near.filter(|_| f64::from(unit(hash(seed ^ 0x6))) < FOLLOWED);
-            let known = if followed.is_some() { 1.0 - 1.0 / FOLLOWED } else { 1.0 };
-            (0..3).for_each(|band| sum[band] += known * throughput[band] * f64::from(value[band]));
-            let Some((triangle, uv, side)) = followed else { return sum };
-            throughput.iter_mut().for_each(|t| *t /= FOLLOWED);
+    /// By id, radiosity and the distance below which it is not looked up, metres.
+    fn looked_up(&self) -> Vec<[f32; 4]> {
+        let near = self.area.iter().map(|area| near(*area) as f32).chain(std::iter::repeat(0.0));
+        self.values.iter().zip(near).map(|([r, g, b, _], near)| [*r, *g, *b, near]).collect()
+    }
+}
 
-            // Go on as a path from the very spot.
-            let (scene, mesh) = (self.tracer.scene, self.tracer.mesh);
+/// Cells along a side of the square whose rays are traced one after another.
+const CELLS: usize = 16;
+
+/// The first rays of a receiver, by their number, and the order in which they are traced: rays that go about the same way
+/// one after another find the same boxes in the caches, and the processor guesses their branches. The points of a
+/// sequence jump from one end of the hemisphere to the other.
+#[derive(Default)]
+struct Volley {
+    points: Vec<[f32; 2]>,
+    directions: Vec<[f32; 3]>,
+    order: Vec<u32>,
+    light: Vec<[f64; 3]>,
+}
+
+impl Volley {
+    /// Those of a sequence.
+    fn aim(&mut self, sequence: &Sequence, rays: u32) {
+        self.points.clear();
+        self.directions.clear();
+        for first in (0..rays).step_by(EIGHT) {
+            let ([u, v], [x, y, z]) = sequence.eight_directions(first);
+            self.points.extend((0..EIGHT).map(|lane| [u[lane], v[lane]]));
+            self.directions.extend((0..EIGHT).map(|lane| [x[lane], y[lane], z[lane]]));
+        }
+        self.points.truncate(rays as usize);
+        // Sort by cells: where each begins, then each ray to the next place of its cell.
+        let mut next = [0; CELLS * CELLS];
+        self.points.iter().for_each(|point| next[cell(*point)] += 1);
+        let mut begin = 0;
+        for next in &mut next {
+            (begin, *next) = (begin + *next, begin);
+        }
+        self.order.resize(rays as usize, 0);
+        for (index, point) in (0..rays).zip(&self.points) {
+            let next = &mut next[cell(*point)];
+            self.order[*next as usize] = index;
+            *next += 1;
+        }
+        self.light.resize(rays as usize, [0.0; 3]);
+    }
+}
+
+/// The number of a point's cell along a curve that keeps cells together (Morton 1966).
+fn cell(point: [f32; 2]) -> usize {
+    let [i, j] = point.map(|x| {
+        let i = (x * CELLS as f32) as usize;
+        let i = (i | i << 2) & 0x33;
+        (i | i << 1) & 0x55
+    });
+    i | j << 1
+}
+
+/// Directions over the surface at a place, and the rays that go there.
+#[derive(Clone, Copy)]
+struct Hemisphere {
+    fan: Fan,
+    frame: [Vec3; 3],
+}
+
+impl Hemisphere {
+    fn new(tracer: &Tracer, place: &Place) -> Hemisphere {
+        Hemisphere { fan: tracer.fan(place), frame: frame(place.normal).map(|axis| axis.as_vec3()) }
+    }
+
+    fn ray(&self, [x, y, z]: [f32; 3]) -> Ray {
+        self.fan.ray(x * self.frame[0] + y * self.frame[1] + z * self.frame[2], f32::INFINITY)
+    }
+}
+
+/// Where on a surface a ray ended.
+struct Spot {
+    triangle: usize,
+    uv: [f32; 2],
+    side: Side,
+    id: u32,
+}
+
+/// A gather under way.
+struct Caster<'g, 'a> {
+    gather: &'g Gather<'a>,
+    /// [`Gather::looked_up`]: all that most rays ask for lies in one place.
+    looked_up: Vec<[f32; 4]>,
+}
+
+impl<'a> Caster<'_, 'a> {
+    /// Radiosity that arrives along a ray, without that of the luminaires.
+    #[inline]
+    fn arriving(&self, ray: &Ray, seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
+        match self.end(ray, seed) {
+            (light, None) => light.map(f64::from),
+            (light, Some(spot)) => self.followed(light, spot, seed, parts),
+        }
+    }
+
+    /// Radiosity of what a ray meets, and the spot from which it goes on.
+    #[inline]
+    fn end(&self, ray: &Ray, seed: u32) -> (Bands, Option<Spot>) {
+        let Gather { tracer, ids, .. } = self.gather;
+        let found = tracer.first(ray, seed);
+        let id = ids.id(found, ray.direction.as_dvec3());
+        let [r, g, b, near] = self.looked_up[id as usize];
+        let spot = match found {
+            Found::Surface { triangle, uv, side, distance } if distance < near => {
+                let is_followed = f64::from(unit(hash(seed ^ 0x6))) < FOLLOWED;
+                is_followed.then_some(Spot { triangle: triangle as usize, uv, side, id })
+            }
+            _ => None,
+        };
+        ([r, g, b], spot)
+    }
+
+    /// The same along a ray that met `light` and goes on as a path from the very spot.
+    fn followed(&self, light: Bands, spot: Spot, mut seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
+        let gather = self.gather;
+        let (scene, mesh) = (gather.tracer.scene, gather.tracer.mesh);
+        let (mut sum, mut throughput) = ([0f64; 3], [1f64; 3]);
+        let mut end = (light, Some(spot));
+        for bounce in 0.. {
+            let (value, spot) = end;
+            let spot = spot.filter(|_| bounce < DEEPEST);
+            let known = if spot.is_some() { 1.0 - 1.0 / FOLLOWED } else { 1.0 };
+            (0..3).for_each(|band| sum[band] += known * throughput[band] * f64::from(value[band]));
+            let Some(Spot { triangle, uv, side, id }) = spot else { return sum };
+            throughput.iter_mut().for_each(|t| *t /= FOLLOWED);
             let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
             let at = mesh.surface(triangle, uv);
             let sign = if side == Side::Front { 1.0 } else { -1.0 };
-            let mut spot = Place {
+            let mut place = Place {
                 point: mesh.point(triangle, uv),
                 normal: sign * mesh.normal(triangle),
                 triangle: triangle as u32,
             };
-            if !self.luminaires.carries(triangle, side) {
+            if !gather.luminaires.carries(triangle, side) {
                 let luminance = scene.emitted_luminance(at);
                 for band in 0..3 {
                     sum[band] += throughput[band] * std::f64::consts::PI * f64::from(luminance[band]);
                 }
             }
-            let element = self.returned(at, id, &mut throughput, &mut spot, seed);
+            let element = gather.returned(at, id, &mut throughput, &mut place, seed);
             if throughput.iter().all(|t| *t <= 0.0) {
                 return sum;
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
-            let direct = self.one_light(&spot, element as usize, seed, parts);
+            let direct = gather.one_light(&place, element as usize, seed, parts);
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
             let [u, v] = [hash(seed ^ 0x1), hash(seed ^ 0x2)].map(|h| f64::from(unit(h)));
-            direction = cosine_direction(&frame(spot.normal), u, v);
-            place = spot;
+            let direction = cosine_direction(&frame(place.normal), u, v);
+            end = self.end(&gather.tracer.ray(&place, direction, f64::INFINITY), seed);
         }
         sum
     }
+}
 
+impl<'a> Gather<'a> {
     /// Weighs a path by what an element gives back at a spot. What a sheet sends came from this side, or through it from
     /// the other: one of them is followed. The element whose light goes on, and the spot turned to its side.
     fn returned(&self, at: Surface, id: u32, throughput: &mut [f64; 3], spot: &mut Place, seed: u32) -> u32 {
@@ -188,26 +306,31 @@ impl<'a> Gather<'a> {
             return [0.0; 3];
         }
         let received = self.columns.seen_by_light(element);
-        let total: f64 = received.iter().map(|e| f64::from(luminance(*e))).sum();
-        let even = 1.0 / lights as f64;
-        let probability = |light: usize| {
-            let share = if total > 0.0 { f64::from(luminance(received[light])) / total } else { even };
-            (1.0 - UNGUIDED) * share + UNGUIDED * even
-        };
-        let mut rest = f64::from(unit(hash(seed ^ 0x3)));
-        let mut pick = lights - 1;
-        for light in 0..lights {
-            if rest < probability(light) {
-                pick = light;
-                break;
-            }
-            rest -= probability(light);
-        }
-        let scale = 1.0 / probability(pick);
+        let (pick, probability) = pick_light(received, f64::from(unit(hash(seed ^ 0x3))));
         let here = self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4), parts);
-        std::array::from_fn(|band| {
-            let all: f64 = received.iter().map(|e| f64::from(e[band])).sum();
-            all + scale * (here[band] - f64::from(received[pick][band]))
-        })
+        let mut direct = [0f64; 3];
+        received.iter().for_each(|e| (0..3).for_each(|band| direct[band] += f64::from(e[band])));
+        std::array::from_fn(|band| direct[band] + (here[band] - f64::from(received[pick][band])) / probability)
     }
+}
+
+/// One of some lights with u in [0, 1), by what an element received of each, and how probable that was.
+fn pick_light(received: &[Bands], u: f64) -> (usize, f64) {
+    let of = |light: usize| f64::from(luminance(received[light]));
+    let lights = received.len();
+    let total: f64 = (0..lights).map(of).sum();
+    let unguided = if total > 0.0 { UNGUIDED } else { 1.0 };
+    let even = unguided / lights as f64;
+    let pick = if u < unguided {
+        ((u / even) as usize).min(lights - 1)
+    } else {
+        let mut rest = (u - unguided) / (1.0 - unguided) * total;
+        let reached = |light: &usize| {
+            rest -= of(*light);
+            rest < 0.0
+        };
+        (0..lights).find(reached).unwrap_or(lights - 1)
+    };
+    let share = if total > 0.0 { of(pick) / total } else { 0.0 };
+    (pick, even + (1.0 - unguided) * share)
 }

@@ -115,7 +115,7 @@ pub fn from_many(
     let mut sum = [0f64; 3];
     let mut outcome = CHANCE;
     for index in first..first + n {
-        let [u, v, _, _] = sequence.point(index);
+        let [u, v] = sequence.pair(index);
         let mut u = f64::from(u);
         let Some((leaf, probability)) = tree.pick(node, place.point, place.normal, &mut u) else { continue };
         let range = tree.leaves()[leaf].start as usize..tree.leaves()[leaf].end as usize;

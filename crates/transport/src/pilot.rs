@@ -84,7 +84,7 @@ impl Pilot {
     }
 
     /// A ray of a half of receiver k, drawn from (u, v), brought light. What brings none need not be told.
-    pub fn add(&mut self, k: usize, half: usize, [u, v, ..]: [f32; 4], arriving: [f64; 3]) {
+    pub fn add(&mut self, k: usize, half: usize, [u, v]: [f32; 2], arriving: [f64; 3]) {
         let own = &mut self.receivers[k];
         (0..3).for_each(|band| own.halves[half][band] += arriving[band]);
         let light = luminance_of(arriving);
@@ -227,7 +227,7 @@ mod tests {
             pilot.receivers[0] = Receiver { plane: Some((0, DVec3::Z)), rays: 64, ..Receiver::default() };
             let sequence = Sequence::new(3, 1);
             for index in 0..64 {
-                pilot.add(0, usize::from(index >= 32), sequence.point(index), [1.0; 3]);
+                pilot.add(0, usize::from(index >= 32), sequence.pair(index), [1.0; 3]);
             }
             let mut asked = 0;
             let halves = pilot.mean(0, (&Sequence::new(3, 2), 0), |_, _| {
@@ -254,7 +254,7 @@ mod tests {
                 pilot.begin(1, rays, 100.0);
                 pilot.receivers[0] = Receiver { plane: Some((0, DVec3::Z)), rays, ..Receiver::default() };
                 let mut sum = 0.0;
-                for point in (0..rays).map(|index| sequence.point(index)).filter(|p| inside(p[0], p[1])) {
+                for point in (0..rays).map(|index| sequence.pair(index)).filter(|p| inside(p[0], p[1])) {
                     pilot.add(0, 0, point, light(point[0], point[1]));
                     sum += 100.0;
                 }

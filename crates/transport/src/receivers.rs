@@ -55,6 +55,12 @@ impl Site {
         self.triangle
     }
 
+    /// Its only place, where it has no area.
+    pub fn point(&self) -> Option<Place> {
+        let Site { origin, normal, triangle, .. } = *self;
+        (self.edges == [DVec3::ZERO; 2]).then_some(Place { point: origin, normal, triangle })
+    }
+
     /// The place that (x, y) in the unit square maps to.
     #[inline]
     pub fn place(&self, x: f32, y: f32) -> Place {

@@ -133,7 +133,7 @@ impl<R: Receivers> Caster<'_, R> {
             let point = sequence.point(index);
             *id = self.cast((&site, near), &frame, point, hash(hash(seed) ^ index));
             if let Some(light) = self.light(*id) {
-                pilot.add(k, m / half, point, light);
+                pilot.add(k, m / half, [point[0], point[1]], light);
             }
         }
     }
