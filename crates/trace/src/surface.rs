@@ -194,8 +194,9 @@ impl<'a> Tracer<'a> {
         } else {
             self.tree.closest_where(ray, |t, u, v, _| self.stops(t, u, v, seed))
         };
-        let hit = hit.map(|hit| if self.is_at_edge(&hit) { self.nearest_at_edge(ray, hit, seed) } else { hit });
-        self.found(hit)
+        let Some(hit) = hit else { return Found::Escaped };
+        // Two calls, or the hit is copied as a whole before its parts have reached memory, and waits.
+        if self.is_at_edge(&hit) { self.found(self.nearest_at_edge(ray, hit, seed)) } else { self.found(hit) }
     }
 
     /// Whether a hit is so near an edge of its triangle that rounding decides what is met there.
@@ -237,9 +238,10 @@ impl<'a> Tracer<'a> {
 
     /// The first surface that a viewer sees: backs of one-sided surfaces are passed, as viewers cull them.
     pub fn seen(&self, ray: &Ray, seed: u32) -> Found {
-        self.found(self.tree.closest_where(ray, |t, u, v, back| {
+        let hit = self.tree.closest_where(ray, |t, u, v, back| {
             (!back || self.kind[t as usize].double_sided) && self.stops(t, u, v, seed)
-        }))
+        });
+        hit.map_or(Found::Escaped, |hit| self.found(hit))
     }
 
     /// Whether anything stops a ray before its end.
@@ -270,17 +272,12 @@ impl<'a> Tracer<'a> {
         !self.blocked(&ray, seed)
     }
 
-    fn found(&self, hit: Option<Hit>) -> Found {
-        match hit {
-            None => Found::Escaped,
-            Some(hit) if hit.back && !self.kind[hit.triangle as usize].double_sided => Found::Back,
-            Some(hit) => Found::Surface {
-                triangle: hit.triangle,
-                uv: [hit.u, hit.v],
-                side: if hit.back { Side::Back } else { Side::Front },
-                distance: hit.t,
-            },
+    #[inline]
+    fn found(&self, Hit { triangle, u, v, back, t }: Hit) -> Found {
+        if back && !self.kind[triangle as usize].double_sided {
+            return Found::Back;
         }
+        Found::Surface { triangle, uv: [u, v], side: if back { Side::Back } else { Side::Front }, distance: t }
     }
 
     fn stops(&self, triangle: u32, u: f32, v: f32, seed: u32) -> bool {

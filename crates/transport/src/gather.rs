@@ -11,7 +11,7 @@ use crate::rows::IdSpace;
 use crate::{Columns, Luminaires, Progress, Receivers, Stopped};
 use glam::{DVec2, Vec3};
 use radiosity_scene::{Bands, Side, Surface, luminance};
-use radiosity_trace::sampling::{EIGHT, Sequence, cosine_direction, cosine_directions, frame, hash, unit};
+use radiosity_trace::sampling::{EIGHT, Sequence, cosine_directions, frame, hash, unit};
 use radiosity_trace::{Fan, Found, Place, Ray, Tracer};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -106,8 +106,7 @@ impl<'a> Gather<'a> {
                 let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
                 *mean = pilot.mean(k, (&sequence, 0), |index, [u, v, x, y]| {
                     let above = only.unwrap_or_else(|| Hemisphere::new(self.tracer, &site.place(x, y)));
-                    let ray = above.ray(cosine_directions([[u], [v]]).map(|[x]| x));
-                    caster.arriving(&ray, hash(salt ^ index), &mut parts)
+                    caster.arriving(&above.towards([u, v]), hash(salt ^ index), &mut parts)
                 });
             }
             let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
@@ -187,8 +186,14 @@ impl Hemisphere {
         Hemisphere { fan: tracer.fan(place), frame: frame(place.normal).map(|axis| axis.as_vec3()) }
     }
 
+    /// The ray in a direction of the frame about the normal.
     fn ray(&self, [x, y, z]: [f32; 3]) -> Ray {
         self.fan.ray(x * self.frame[0] + y * self.frame[1] + z * self.frame[2], f32::INFINITY)
+    }
+
+    /// The ray that a point of the unit square stands for.
+    fn towards(&self, point: [f32; 2]) -> Ray {
+        self.ray(cosine_directions(point.map(|x| [x])).map(|[x]| x))
     }
 }
 
@@ -268,9 +273,8 @@ impl<'a> Caster<'_, 'a> {
             seed = hash(seed.wrapping_add(0x9e37_79b9));
             let direct = gather.one_light(&place, element as usize, seed, parts);
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
-            let [u, v] = [hash(seed ^ 0x1), hash(seed ^ 0x2)].map(|h| f64::from(unit(h)));
-            let direction = cosine_direction(&frame(place.normal), u, v);
-            end = self.end(&gather.tracer.ray(&place, direction, f64::INFINITY), seed);
+            let point = [hash(seed ^ 0x1), hash(seed ^ 0x2)].map(unit);
+            end = self.end(&Hemisphere::new(gather.tracer, &place).towards(point), seed);
         }
         sum
     }
