@@ -10,8 +10,8 @@ mod corners;
 mod planes;
 
 use corners::{Cell, Corners};
-pub use planes::{Finding, Planes};
 use glam::DVec2;
+pub use planes::{Finding, Planes};
 use radiosity_scene::{Bands, Elements, Mesh, Side};
 
 /// Continuous values over the sides of a mesh.

@@ -156,12 +156,7 @@ fn of_cell(mesh: &Mesh, elements: &Elements, cell: usize, halves: &[[Bands; 2]],
 }
 
 /// The light of all cells, shared with others of their plane as far as it is smooth; nothing where a cell is buried.
-pub(super) fn shared(
-    mesh: &Mesh,
-    elements: &Elements,
-    halves: &[[Bands; 2]],
-    weight: &[f64],
-) -> Vec<Option<[f64; 3]>> {
+pub(super) fn shared(mesh: &Mesh, elements: &Elements, halves: &[[Bands; 2]], weight: &[f64]) -> Vec<Option<[f64; 3]>> {
     let found = |cell| Some((cell, of_cell(mesh, elements, cell, halves, weight)?));
     let (cells, found): (Vec<usize>, Vec<Finding>) = (0..elements.cells()).filter_map(found).unzip();
     let mut light = vec![None; elements.cells()];
