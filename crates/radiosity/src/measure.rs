@@ -10,7 +10,7 @@ use glam::DVec3;
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::{Place, Tracer};
 use radiosity_transport::Shadowing;
-use radiosity_view::{Audit, Auditor, Finding, Planes};
+use radiosity_view::{Audit, Auditor, FLAT, Finding, Planes};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -56,9 +56,6 @@ const HOPELESS: f64 = 0.8;
 /// Doublings of the rays that a place gets by its light, from the darkest to the brightest. In a furnished office at 1 %
 /// one place in a hundred is off by 14 % or more so, in 13.6 s; with a quarter of the rays in the dark by 16.5 %, in 12.3 s.
 const DOUBLINGS: [i32; 2] = [-1, 2];
-
-/// Places receive like their triangle where their normal differs from its own by less than this cosine, of a degree.
-const FLAT: f64 = 0.9998;
 
 /// Most that the rays grow by from one round to the next.
 const MOST_GROWTH: f64 = 8.0;

@@ -83,7 +83,7 @@ pub trait Receivers: Sync {
     /// Where receiver `i` lies; `None` if nothing of it is exposed.
     fn site(&self, i: usize) -> Option<Site>;
     /// Whether a place of the receiver lies inside a solid and must not be counted. Asked only where a ray from the
-    /// place ended at once.
+    /// place met a back, or none of its shadow rays came through.
     fn buried(&self, _tracer: &Tracer, _place: &Place, _seed: u32) -> bool {
         false
     }

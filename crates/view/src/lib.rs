@@ -13,5 +13,5 @@ pub mod referee;
 pub use audit::{Audit, Auditor};
 pub use picture::{Picture, ViewRays};
 pub use pool::Pooled;
-pub use reconstruct::{Field, Finding, Planes, Shared, shared_corner};
+pub use reconstruct::{FLAT, Field, Finding, Planes, Shared, shared_corner};
 pub use referee::Referee;

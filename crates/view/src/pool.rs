@@ -58,13 +58,13 @@ pub struct Pooled {
 }
 
 /// Pooled light of all samples of a plane, in their order. Noise of one must not be that of another: a part that they
-/// share is taken for light.
-pub fn pooled(samples: &[Sample]) -> Vec<Pooled> {
+/// share is taken for light. `walls` stand on the plane, from one point to another: no square of places that share goes over one.
+pub fn pooled(samples: &[Sample], walls: &[[DVec2; 2]]) -> Vec<Pooled> {
     let alone = |sample: &Sample| Pooled { light: sample.light, own: 1.0 };
     if (samples.len() as f64) < FEWEST {
         return samples.iter().map(alone).collect();
     }
-    let grid = Grid::new(samples);
+    let grid = Grid::new(samples, walls);
     grid.pooled().into_iter().zip(samples).map(|(pooled, sample)| pooled.unwrap_or(alone(sample))).collect()
 }
 
@@ -77,6 +77,8 @@ struct Grid<'s> {
     at: Vec<DVec2>,
     /// Column and row of its slot.
     slot: Vec<[usize; 2]>,
+    /// Those of slots that walls go through, some more than once.
+    walls: Vec<[usize; 2]>,
 }
 
 /// A plane through light, at the place that it was laid around.
@@ -88,23 +90,32 @@ struct Fit {
 }
 
 impl Grid<'_> {
-    fn new(samples: &[Sample]) -> Grid<'_> {
+    fn new<'s>(samples: &'s [Sample], walls: &[[DVec2; 2]]) -> Grid<'s> {
         let bounds = |(low, high): (DVec2, DVec2), sample: &Sample| (low.min(sample.at), high.max(sample.at));
         let (low, high) = samples.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), bounds);
         let mut scale = 1.0;
-        let size = |scale: f64| ((high - low) * scale).to_array().map(|x| x.round() as usize + 1);
+        let size = |scale: f64| ((high - low) * scale).to_array().map(|x| (x.round() as usize).saturating_add(1));
         let most = FEW_SLOTS.max(MOST_SLOTS * samples.len());
         while size(scale).into_iter().fold(1usize, usize::saturating_mul) > most {
             scale *= 0.5;
         }
         let [columns, rows] = size(scale);
         let middle = 0.5 * (low + high);
+        // Twice in each slot on their way, and those beside the grid not at all.
+        let slots_of = |[from, to]: &[DVec2; 2]| {
+            let [from, to] = [from, to].map(|p| (*p - low) * scale);
+            let steps = (2.0 * from.distance(to)).ceil().clamp(1.0, 2.0 * (columns + rows) as f64) as usize;
+            (0..=steps).map(move |k| (from + k as f64 / steps as f64 * (to - from)).round())
+        };
+        let is_inside = |p: &DVec2| p.x >= 0.0 && p.y >= 0.0 && (p.x as usize) < columns && (p.y as usize) < rows;
+        let walls = walls.iter().flat_map(slots_of).filter(is_inside).map(|p| p.to_array().map(|x| x as usize));
         Grid {
             samples,
             columns,
             rows,
             at: samples.iter().map(|sample| (sample.at - middle) * scale).collect(),
             slot: samples.iter().map(|s| ((s.at - low) * scale).to_array().map(|x| x.round() as usize)).collect(),
+            walls: walls.collect(),
         }
     }
 
@@ -116,9 +127,12 @@ impl Grid<'_> {
             [w, w * x, w * y, w * x * x, w * x * y, w * y * y, r, r * x, r * y, g, g * x, g * y, b, b * x, b * y]
         });
         let count = Sums::new(self, |_| [1.0]);
+        let walls = Sums::of(self, self.walls.iter().map(|slot| (*slot, [1.0])));
         let plane = |i: usize, radius: usize| {
-            let [count] = count.within(self, i, radius);
-            (count >= FEWEST).then(|| plane(&moments.within(self, i, radius), self.at[i], self.weight(i))).flatten()
+            let ([count], [walls]) = (count.within(self, i, radius), walls.within(self, i, radius));
+            (count >= FEWEST && walls == 0.0)
+                .then(|| plane(&moments.within(self, i, radius), self.at[i], self.weight(i)))
+                .flatten()
         };
 
         // The radius that predicts best, by its number, and how far its planes are off.
@@ -206,10 +220,14 @@ struct Sums<const N: usize> {
 impl<const N: usize> Sums<N> {
     /// Of what each sample has.
     fn new(grid: &Grid, of: impl Fn(usize) -> [f64; N]) -> Sums<N> {
+        Sums::of(grid, grid.slot.iter().enumerate().map(|(i, slot)| (*slot, of(i))))
+    }
+
+    /// Of what is in slots.
+    fn of(grid: &Grid, items: impl Iterator<Item = ([usize; 2], [f64; N])>) -> Sums<N> {
         let stride = grid.columns + 1;
         let mut table = vec![[0.0; N]; stride * (grid.rows + 1)];
-        for (i, [x, y]) in grid.slot.iter().enumerate() {
-            let own = of(i);
+        for ([x, y], own) in items {
             let sum = &mut table[(y + 1) * stride + x + 1];
             *sum = std::array::from_fn(|k| sum[k] + own[k]);
         }
@@ -259,7 +277,7 @@ mod tests {
     }
 
     fn pooled(values: &[Bands], noise: f32) -> Vec<Pooled> {
-        super::pooled(&samples(values, noise))
+        super::pooled(&samples(values, noise), &[])
     }
 
     /// Root mean square distance from the truth over places that count, and the mean one.
@@ -292,7 +310,7 @@ mod tests {
         let some: Vec<Sample> = (0..all.len()).filter(|i| i % 5 == i / SIDE % 5).map(|i| all[i]).collect();
         assert!(some.len() > SIDE * SIDE / 6);
         let off = |(p, s): (Pooled, &Sample)| (f64::from(p.light[1]) - truth(s.at)).powi(2);
-        let all = (super::pooled(&some).into_iter().zip(&some).map(off).sum::<f64>() / some.len() as f64).sqrt();
+        let all = (super::pooled(&some, &[]).into_iter().zip(&some).map(off).sum::<f64>() / some.len() as f64).sqrt();
         assert!(all < 0.35, "{all}");
     }
 
@@ -310,10 +328,34 @@ mod tests {
             };
             let samples: Vec<Sample> = (0..SIDE * SIDE).map(sample).collect();
             let off = |(p, s): (Pooled, &Sample)| (f64::from(p.light[1]) - truth(s.at)).powi(2);
-            (super::pooled(&samples).into_iter().zip(&samples).map(off).sum::<f64>() / samples.len() as f64).sqrt()
+            (super::pooled(&samples, &[]).into_iter().zip(&samples).map(off).sum::<f64>() / samples.len() as f64).sqrt()
         };
         let [weighed, alike] = [true, false].map(off);
         assert!(weighed < 0.1 && weighed < 0.9 * alike, "{weighed} {alike}");
+    }
+
+    /// A wall without thickness between a bright room and a dark one, with a door: what is behind it has nothing of the bright
+    /// noise or light, and only what is beside it or opposite to the door stays as it is.
+    #[test]
+    fn nothing_is_shared_through_walls() {
+        let middle = SIDE as f64 / 2.0 - 0.5;
+        let is_bright = |x: f64| x < middle;
+        let noise = noisy(|_, _| 0.0, 7);
+        let mut samples = samples(&noise, 0.0);
+        for sample in &mut samples {
+            let (light, noise) = if is_bright(sample.at.x) { (1000.0, 100.0) } else { (1.0, 0.1) };
+            *sample = Sample { light: sample.light.map(|e| light + noise * e), noise, ..*sample };
+        }
+        let wall = [DVec2::new(middle, 12.0), DVec2::new(middle, SIDE as f64)];
+        let (mut square, mut count) = (0.0, 0.0);
+        for (p, s) in super::pooled(&samples, &[wall]).iter().zip(&samples) {
+            if !is_bright(s.at.x) && s.at.y > 13.0 {
+                assert!((p.light[0] - 1.0).abs() < 1.0, "{} at {}", p.light[0], s.at);
+                (square, count) = (square + f64::from(p.light[0] - 1.0).powi(2), count + 1.0);
+            }
+        }
+        let off: f64 = (square / count).sqrt();
+        assert!(off < 0.08, "{off}");
     }
 
     /// Two clusters a million slots apart take as little memory as beside each other.
@@ -321,9 +363,9 @@ mod tests {
     fn far_apart_is_not_large() {
         let mut samples = samples(&noisy(|_, _| 40.0, 6), 1.0);
         samples.iter_mut().skip(SIDE * SIDE / 2).for_each(|sample| sample.at += DVec2::splat(1e6));
-        let grid = Grid::new(&samples);
+        let grid = Grid::new(&samples, &[]);
         assert!(grid.columns * grid.rows <= MOST_SLOTS * samples.len());
-        assert!(super::pooled(&samples).iter().all(|p| p.light[0].is_finite()));
+        assert!(super::pooled(&samples, &[]).iter().all(|p| p.light[0].is_finite()));
     }
 
     #[test]
@@ -344,7 +386,7 @@ mod tests {
         let values: Vec<Bands> = (0..SIDE * SIDE).map(|i| [unit(hash(i as u32)); 3]).collect();
         let kept = pooled(&values, 0.0);
         assert!(kept.iter().zip(&values).all(|(p, v)| p.light == *v && p.own == 1.0));
-        let few = super::pooled(&samples(&values[..3], 1.0));
+        let few = super::pooled(&samples(&values[..3], 1.0), &[]);
         assert!(few.iter().zip(&values).all(|(p, v)| p.light == *v && p.own == 1.0));
     }
 }

@@ -11,7 +11,7 @@ mod planes;
 
 use corners::{Cell, Corners};
 use glam::DVec2;
-pub use planes::{Finding, Planes};
+pub use planes::{FLAT, Finding, Planes};
 use radiosity_scene::{Bands, Elements, Mesh, Side};
 
 /// Continuous values over the sides of a mesh.

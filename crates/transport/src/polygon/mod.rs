@@ -303,6 +303,19 @@ mod tests {
 
     /// θ/sin θ from the quotient, against that of the functions where those lose nothing.
     #[test]
+    fn series_are_those_of_the_library() {
+        for i in 1..=2000 {
+            let x = 1e-9 + f64::from(i) / 2000.0 * 1.2 * SMALL;
+            for far in [-2f64, 0.3, 1.0, 7.0] {
+                let off = (arc_tangent(x * far.abs(), far) - (x * far.abs()).atan2(far)).abs();
+                assert!(off < 2e-15, "{off} at {x} of {far}");
+            }
+            let ((sine, cosine), (s, c)) = (sine_cosine(x), x.sin_cos());
+            assert!((sine - s).abs() < 2e-15 && (cosine - c).abs() < 2e-15, "{x}");
+        }
+    }
+
+    #[test]
     fn angles_over_their_sines_are_exact() {
         for k in 0..=1000 {
             let angle = 0.5 * std::f64::consts::PI * f64::from(k) / 1000.0;

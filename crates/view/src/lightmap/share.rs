@@ -35,7 +35,7 @@ impl Atlas {
                 .filter_map(texel)
                 .map(|(i, at)| (i, Sample { at, light: values[i], noise: luminance(noise[i]), weight: 1.0 }))
                 .unzip();
-            own.into_iter().zip(pooled(&samples)).collect()
+            own.into_iter().zip(pooled(&samples, &[])).collect()
         };
         let found: Vec<Vec<(usize, Pooled)>> = charts.par_iter().map(of_chart).collect();
         found.into_iter().flatten().for_each(|(i, value)| out[i] = value);

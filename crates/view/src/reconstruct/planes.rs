@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Triangles lie on one plane where their normals differ by less than this cosine, of a degree.
-pub(super) const FLAT: f64 = 0.9998;
+pub const FLAT: f64 = 0.9998;
 
-/// Triangles that lie flat beside each other, where light is continuous from one to the next: planes end where walls stand on
-/// them.
+/// Triangles that lie flat beside each other, where light is continuous from one to the next. Planes end where walls part them;
+/// where one goes on around the end of a wall or through a door, no places share over the wall.
 #[derive(Clone, Debug)]
 pub struct Planes {
     /// By triangle and side.
@@ -27,6 +27,8 @@ struct Plane {
     longest: f64,
     /// m².
     area: f64,
+    /// Edges on which another face stands, between two of its own triangles.
+    walls: Vec<[DVec3; 2]>,
 }
 
 /// What rays found at a place of a mesh.
@@ -42,7 +44,7 @@ pub struct Finding {
     pub light: Bands,
     /// Standard error of its luminance, lx.
     pub noise: f32,
-    /// In proportion to the rays.
+    /// In proportion to the rays, about.
     pub weight: f64,
 }
 
@@ -55,9 +57,14 @@ impl Planes {
         for (t, side) in sides(elements, n) {
             for edge in 0..3 {
                 let others = beside.entry((edge_key(mesh, t, edge), side as usize)).or_default();
-                for &other in others.iter().filter(|other| mesh.normal(t).dot(mesh.normal(**other)) > FLAT) {
+                for &other in others.iter() {
                     let [a, b] = [t, other].map(|t| root(&mut parent, 2 * t + side as usize));
-                    parent[a.max(b)] = a.min(b);
+                    // Flat with the first triangles of both, or one would come around a pillar facet by facet.
+                    let first = [a / 2, b / 2].map(|t| mesh.normal(t));
+                    let is_flat = |t: usize| first.iter().all(|normal| normal.dot(mesh.normal(t)) > FLAT);
+                    if is_flat(t) && is_flat(other) && first[0].dot(first[1]) > FLAT {
+                        parent[a.max(b)] = a.min(b);
+                    }
                 }
                 others.push(t);
             }
@@ -72,19 +79,30 @@ impl Planes {
             planes[own].extend(mesh, t);
             number[t][side as usize] = Some(own);
         }
+        for (t, [a, b], other) in walled(mesh) {
+            for (own, others) in number[t].iter().zip(number[other]) {
+                if let Some(own) = own.filter(|own| others == Some(*own)) {
+                    planes[own].walls.push([mesh.vertices[a as usize], mesh.vertices[b as usize]]);
+                }
+            }
+        }
         Planes { number, planes }
     }
 
-    /// Light at all places, shared with others of their plane as far as it is smooth.
+    /// Light at all places, shared with others of their plane as far as it is smooth. Places that lie on no plane keep theirs, and
+    /// so do those whose light is not finite.
     pub fn pooled(&self, found: &[Finding]) -> Vec<Pooled> {
         let mut by_plane: Vec<Vec<usize>> = vec![Vec::new(); self.planes.len()];
         for (i, finding) in found.iter().enumerate() {
-            if let Some(plane) = self.number[finding.triangle][finding.side as usize] {
+            let is_finite =
+                finding.point.is_finite() && finding.noise.is_finite() && finding.light.iter().all(|e| e.is_finite());
+            let sides = self.number.get(finding.triangle).filter(|_| is_finite);
+            if let Some(plane) = sides.and_then(|sides| sides[finding.side as usize]) {
                 by_plane[plane].push(i);
             }
         }
         let mut out: Vec<Pooled> = found.iter().map(|f| Pooled { light: f.light, own: 1.0 }).collect();
-        let of_plane = |(plane, own): (&Plane, &Vec<usize>)| pooled(&plane.samples(found, own));
+        let of_plane = |(plane, own): (&Plane, &Vec<usize>)| plane.pooled(found, own);
         let all: Vec<Vec<Pooled>> = self.planes.par_iter().zip(&by_plane).map(of_plane).collect();
         for (own, light) in by_plane.iter().zip(all) {
             own.iter().zip(light).for_each(|(&i, light)| out[i] = light);
@@ -110,25 +128,56 @@ impl Plane {
             let length = edge.length();
             if length > self.longest {
                 let along = edge / length;
-                *self = Plane { axes: [along, mesh.normal(triangle).cross(along)], longest: length, ..*self };
+                (self.axes, self.longest) = ([along, mesh.normal(triangle).cross(along)], length);
             }
         }
     }
 
-    /// Some findings on it, about one to a slot.
-    fn samples(&self, found: &[Finding], own: &[usize]) -> Vec<Sample> {
-        let at = |i: &usize| DVec2::from(self.axes.map(|axis| axis.dot(found[*i].point)));
+    /// Light of some findings on it, about one to a slot.
+    fn pooled(&self, found: &[Finding], own: &[usize]) -> Vec<Pooled> {
+        let flat = |point: DVec3| DVec2::from(self.axes.map(|axis| axis.dot(point)));
+        let at = |i: &usize| flat(found[*i].point);
         let bounds = |(low, high): (DVec2, DVec2), i: &usize| (low.min(at(i)), high.max(at(i)));
         let (low, high) = own.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), bounds);
         let around = (high - low).element_product();
         let area = if around > 0.0 { around.min(self.area) } else { self.area };
-        let width = (area / own.len() as f64).sqrt().max(f64::MIN_POSITIVE);
+        let width = if area > 0.0 { (area / own.len() as f64).sqrt() } else { 1.0 };
         let sample = |i: &usize| {
             let Finding { light, noise, weight, .. } = found[*i];
             Sample { at: (at(i) - low) / width, light, noise, weight: weight as f32 }
         };
-        own.iter().map(sample).collect()
+        let walls: Vec<[DVec2; 2]> = self.walls.iter().map(|ends| ends.map(|end| (flat(end) - low) / width)).collect();
+        pooled(&own.iter().map(sample).collect::<Vec<_>>(), &walls)
     }
+}
+
+/// Edges between two triangles that lie flat beside each other on which a third one stands.
+fn walled(mesh: &Mesh) -> Vec<(usize, [u32; 2], usize)> {
+    let mut at_edge: FxHashMap<[u32; 2], Vec<usize>> = FxHashMap::default();
+    let mut edges = Vec::new();
+    for (t, corners) in mesh.triangles.iter().enumerate() {
+        for edge in 0..3 {
+            let (a, b) = (corners[edge], corners[(edge + 1) % 3]);
+            let key = [a.min(b), a.max(b)];
+            let beside = at_edge.entry(key).or_default();
+            if beside.is_empty() {
+                edges.push(key);
+            }
+            beside.push(t);
+        }
+    }
+    let mut walled = Vec::new();
+    for edge in edges {
+        let beside = &at_edge[&edge];
+        for (i, &t) in beside.iter().enumerate() {
+            let is_flat = |other: usize| mesh.normal(t).dot(mesh.normal(other)) > FLAT;
+            let partner = beside[i + 1..].iter().find(|other| is_flat(**other));
+            if let (Some(&other), true) = (partner, beside.iter().any(|other| !is_flat(*other))) {
+                walled.push((t, edge, other));
+            }
+        }
+    }
+    walled
 }
 
 /// What the elements of a cell found, by two halves of their rays; nothing where all of it is buried.
@@ -137,7 +186,7 @@ fn of_cell(mesh: &Mesh, elements: &Elements, cell: usize, halves: &[[Bands; 2]],
     for element in elements.of_cell(cell) {
         let w = weight[element as usize];
         total += w;
-        rays += elements.share(mesh, element);
+        rays += if w > 0.0 { elements.share(mesh, element) } else { 0.0 };
         for (sum, half) in sums.iter_mut().zip(&halves[element as usize]) {
             (0..3).for_each(|band| sum[band] += w * f64::from(half[band]));
         }
@@ -210,6 +259,62 @@ mod tests {
         let (divided, mesh) = scene(true);
         let found = numbers(&divided, &mesh, Side::Front);
         assert!(found[0] != found[1], "{found:?}");
+    }
+
+    /// A pillar of facets so narrow that each is flat beside the next is no plane: its sides look away from each other.
+    #[test]
+    fn a_pillar_is_no_plane() {
+        let mut scene = Scene::default();
+        scene.materials.push(Material::default());
+        let facets = 720;
+        let at = |i: i32, z: f64| {
+            let angle = f64::from(i) / f64::from(facets) * std::f64::consts::TAU;
+            DVec3::new(angle.cos(), angle.sin(), z)
+        };
+        for i in 0..facets {
+            scene.add_quad("pillar", 0, [at(i, 0.0), at(i + 1, 0.0), at(i + 1, 1.0), at(i, 1.0)]);
+        }
+        let mesh = Mesh::new(&scene);
+        let planes = Planes::new(&mesh, &Elements::new(&scene, &mesh, 1.0));
+        assert!(planes.planes.len() > 100, "{}", planes.planes.len());
+        for (t, number) in planes.number.iter().enumerate() {
+            let same = planes.number.iter().position(|other| other[0] == number[0]).unwrap();
+            assert!(mesh.normal(t).dot(mesh.normal(same)) > FLAT);
+        }
+    }
+
+    /// A wall that leaves a door is between places on either side of it all the same.
+    #[test]
+    fn a_wall_with_a_door_is_known() {
+        let mut scene = Scene::default();
+        scene.materials.push(Material { double_sided: true, ..Material::default() });
+        let corners = |points: [[f64; 3]; 4]| points.map(DVec3::from);
+        scene.add_quad("floor", 0, corners([[0., 0., 0.], [8., 0., 0.], [8., 5., 0.], [0., 5., 0.]]));
+        scene.add_quad("wall", 0, corners([[4., 1., 0.], [4., 5., 0.], [4., 5., 3.], [4., 1., 3.]]));
+        let mesh = Mesh::new(&scene);
+        let planes = Planes::new(&mesh, &Elements::new(&scene, &mesh, 0.5));
+        let finding = |i: usize| {
+            let (x, y) = ((i % 80) as f64 / 10.0 + 0.05, (i / 80) as f64 / 10.0 + 0.05);
+            let point = DVec3::new(x, y, 0.0);
+            let is_on = |t: &usize| {
+                let uv = mesh.barycentric(*t, point);
+                scene.triangle_object[mesh.source[*t] as usize] == 0
+                    && uv.min_element() >= 0.0
+                    && uv.element_sum() <= 1.0
+            };
+            let triangle = (0..mesh.triangles.len()).find(is_on).unwrap();
+            let light = if x < 4.0 { 1000.0 + 100.0 * (unit(hash(i as u32)) - 0.5) } else { 1.0 };
+            let noise = if x < 4.0 { 30.0 } else { 0.0 };
+            Finding { point, triangle, side: Side::Front, light: [light; 3], noise, weight: 1.0 }
+        };
+        let found: Vec<Finding> = (0..80 * 50).map(finding).collect();
+        let plane = |f: &Finding| planes.number[f.triangle][0];
+        assert!(found.iter().all(|f| plane(f) == plane(&found[0])), "the door joins both sides");
+        for (f, pooled) in found.iter().zip(planes.pooled(&found)) {
+            if f.point.x > 4.0 && f.point.y > 1.1 {
+                assert!((pooled.light[0] - 1.0).abs() < 1e-2, "{} at {}", pooled.light[0], f.point);
+            }
+        }
     }
 
     /// Noise of places of one plane is shared away, and nothing of their light comes to those of another.
