@@ -322,7 +322,7 @@ mod tests {
         let draw = |i: usize, k: u32| SIDE as f64 * f64::from(unit(hash(hash(i as u32) ^ k)));
         let off = |weigh: bool| {
             let sample = |i: usize| {
-                let (at, rays) = (DVec2::new(draw(i, 1), draw(i, 2)), if i % 2 == 0 { 4.0 } else { 1.0f32 });
+                let (at, rays) = (DVec2::new(draw(i, 1), draw(i, 2)), if i.is_multiple_of(2) { 4.0 } else { 1.0f32 });
                 let light = [truth(at) as f32 + noise[i][0] / rays.sqrt(); 3];
                 Sample { at, light, noise: 1.0 / rays.sqrt(), weight: if weigh { rays } else { 1.0 } }
             };
