@@ -301,7 +301,6 @@ fn linear(x: f64, a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// θ/sin θ from the quotient, against that of the functions where those lose nothing.
     #[test]
     fn series_are_those_of_the_library() {
         for i in 1..=2000 {
@@ -315,6 +314,7 @@ mod tests {
         }
     }
 
+    /// θ/sin θ from the quotient, against that of the functions where those lose nothing.
     #[test]
     fn angles_over_their_sines_are_exact() {
         for k in 0..=1000 {

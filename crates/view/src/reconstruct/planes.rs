@@ -52,32 +52,34 @@ impl Planes {
     /// Of the sides that carry elements.
     pub fn new(mesh: &Mesh, elements: &Elements) -> Planes {
         let n = mesh.triangles.len();
-        let mut parent: Vec<usize> = (0..2 * n).collect();
         let mut beside: FxHashMap<((u32, u32), usize), Vec<usize>> = FxHashMap::default();
         for (t, side) in sides(elements, n) {
             for edge in 0..3 {
-                let others = beside.entry((edge_key(mesh, t, edge), side as usize)).or_default();
-                for &other in others.iter() {
-                    let [a, b] = [t, other].map(|t| root(&mut parent, 2 * t + side as usize));
-                    // Flat with the first triangles of both, or one would come around a pillar facet by facet.
-                    let first = [a / 2, b / 2].map(|t| mesh.normal(t));
-                    let is_flat = |t: usize| first.iter().all(|normal| normal.dot(mesh.normal(t)) > FLAT);
-                    if is_flat(t) && is_flat(other) && first[0].dot(first[1]) > FLAT {
-                        parent[a.max(b)] = a.min(b);
-                    }
-                }
-                others.push(t);
+                beside.entry((edge_key(mesh, t, edge), side as usize)).or_default().push(t);
             }
         }
         let (mut number, mut planes) = (vec![[None; 2]; n], Vec::<Plane>::new());
-        let mut of_root: FxHashMap<usize, usize> = FxHashMap::default();
-        for (t, side) in sides(elements, n) {
-            let own = *of_root.entry(root(&mut parent, 2 * t + side as usize)).or_insert(planes.len());
-            if own == planes.len() {
-                planes.push(Plane::default());
+        for (first, side) in sides(elements, n) {
+            let side = side as usize;
+            if number[first][side].is_some() {
+                continue;
             }
-            planes[own].extend(mesh, t);
-            number[t][side as usize] = Some(own);
+            let (own, mut plane) = (Some(planes.len()), Plane::default());
+            number[first][side] = own;
+            let mut open = vec![first];
+            while let Some(t) = open.pop() {
+                plane.extend(mesh, t);
+                for edge in 0..3 {
+                    for &other in &beside[&(edge_key(mesh, t, edge), side)] {
+                        // Flat with the first, or one would come around a pillar facet by facet.
+                        if number[other][side].is_none() && mesh.normal(first).dot(mesh.normal(other)) > FLAT {
+                            number[other][side] = own;
+                            open.push(other);
+                        }
+                    }
+                }
+            }
+            planes.push(plane);
         }
         for (t, [a, b], other) in walled(mesh) {
             for (own, others) in number[t].iter().zip(number[other]) {
@@ -109,15 +111,6 @@ impl Planes {
         }
         out
     }
-}
-
-/// The least member of a set, whose ways there become shorter.
-fn root(parent: &mut [usize], mut i: usize) -> usize {
-    while parent[i] != i {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    i
 }
 
 impl Plane {
