@@ -1,7 +1,6 @@
 //! From a scene to a solution whose error is known: refine until the audit is content.
 
 use crate::answer::Station;
-use crate::field::SMOOTHING;
 use crate::lightmap::automatic_texels;
 use crate::measure::{ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages, has_time, is_over};
@@ -170,7 +169,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let achieved = audit.upper <= options.error;
         // More rounds only while there is something to gain, and memory and leave to gain it with.
         let smaller = solution.element_size / std::f64::consts::SQRT_2;
-        let noisy = !solve.looked_up && solution.row_noise() / SMOOTHING > 0.5 * options.error;
+        let noisy = !solve.looked_up && solution.field_noise(&received) > 0.5 * options.error;
         let is_given = options.solve.element_size.is_some();
         let next = SolveOptions {
             rays: if noisy { 2 * solution.rays() } else { solution.rays() },

@@ -41,7 +41,7 @@ pub struct Sample {
     pub at: DVec2,
     /// Light, lx per band.
     pub light: Bands,
-    /// Standard error of its luminance, lx.
+    /// Standard error of its luminance, lx; negative where it is told by two halves of the rays and the second found more.
     pub noise: f32,
     /// In proportion to its rays.
     pub weight: f32,
@@ -55,12 +55,21 @@ pub struct Pooled {
     /// How much of it is the place's own beyond its share in the pool: 0 where light is smooth, 1 where the others know nothing of
     /// it.
     pub own: f32,
+    /// What is left of the noise, lx, where those that were given have signs: it is shared as light is.
+    pub noise: f32,
+}
+
+impl Pooled {
+    /// A place that shares with no other.
+    pub(crate) fn alone(light: Bands, noise: f32) -> Pooled {
+        Pooled { light, own: 1.0, noise }
+    }
 }
 
 /// Pooled light of all samples of a plane, in their order. Noise of one must not be that of another: a part that they
 /// share is taken for light. `walls` stand on the plane, from one point to another: no square of places that share goes over one.
 pub fn pooled(samples: &[Sample], walls: &[[DVec2; 2]]) -> Vec<Pooled> {
-    let alone = |sample: &Sample| Pooled { light: sample.light, own: 1.0 };
+    let alone = |sample: &Sample| Pooled::alone(sample.light, sample.noise);
     if (samples.len() as f64) < FEWEST {
         return samples.iter().map(alone).collect();
     }
@@ -81,10 +90,13 @@ struct Grid<'s> {
     walls: Vec<[usize; 2]>,
 }
 
+/// Light of three bands, and its noise.
+type Values = [f64; 4];
+
 /// A plane through light, at the place that it was laid around.
 #[derive(Clone, Copy)]
 struct Fit {
-    light: [f64; 3],
+    values: Values,
     /// How much of it is the place's own.
     share: f64,
 }
@@ -123,8 +135,10 @@ impl Grid<'_> {
     fn pooled(&self) -> Vec<Option<Pooled>> {
         let moments = Sums::new(self, |i| {
             let (DVec2 { x, y }, w) = (self.at[i], self.weight(i));
-            let [r, g, b] = self.samples[i].light.map(|e| w * f64::from(e));
-            [w, w * x, w * y, w * x * x, w * x * y, w * y * y, r, r * x, r * y, g, g * x, g * y, b, b * x, b * y]
+            let [r, g, b, n] = self.values(i).map(|z| w * z);
+            let place = [w, w * x, w * y, w * x * x, w * x * y, w * y * y];
+            let values = [r, r * x, r * y, g, g * x, g * y, b, b * x, b * y, n, n * x, n * y];
+            std::array::from_fn(|k| if k < 6 { place[k] } else { values[k - 6] })
         });
         let count = Sums::new(self, |_| [1.0]);
         let walls = Sums::of(self, self.walls.iter().map(|slot| (*slot, [1.0])));
@@ -165,17 +179,19 @@ impl Grid<'_> {
             }
             let [count, sum] = evened.within(self, i, EVENED);
             let at = sum / count;
-            let near = |k: f64| Some(plane(i, RADII[k as usize]).or_else(|| plane(i, RADII[chosen]))?.light);
+            let near = |k: f64| Some(plane(i, RADII[k as usize]).or_else(|| plane(i, RADII[chosen]))?.values);
             let (low, high, share) = (near(at.floor())?, near(at.ceil())?, at.fract());
             let [count, weight, sum] = variance.within(self, i, COMPARED);
             // Of so many places a variance is known to √(2/n) of itself: less than twice that beyond the noise is chance.
             let noise = sum / weight * (1.0 + (8.0 / count).sqrt());
             let kept = if missed > 0.0 { (1.0 - noise / missed).clamp(0.0, 1.0) } else { 0.0 };
-            let light = std::array::from_fn(|k| {
+            let own = self.values(i);
+            let [r, g, b, noise]: Values = std::array::from_fn(|k| {
                 let shared = low[k] + share * (high[k] - low[k]);
-                (shared + kept * (f64::from(self.samples[i].light[k]) - shared)).max(0.0) as f32
+                shared + kept * (own[k] - shared)
             });
-            Some(Pooled { light, own: kept as f32 })
+            let light = [r, g, b].map(|e| e.max(0.0) as f32);
+            Some(Pooled { light, own: kept as f32, noise: noise as f32 })
         };
         (0..self.samples.len()).map(light).collect()
     }
@@ -183,8 +199,14 @@ impl Grid<'_> {
     /// The weight of a sample, and with it the squared distance from a plane around it that is laid without it.
     fn off(&self, i: usize, fit: Fit) -> [f64; 2] {
         let (own, w) = (f64::from(luminance(self.samples[i].light)), self.weight(i));
-        let off = own - f64::from(luminance(fit.light.map(|e| e as f32)));
+        let [r, g, b, _] = fit.values.map(|e| e as f32);
+        let off = own - f64::from(luminance([r, g, b]));
         [w, w * (off / (1.0 - fit.share)).powi(2)]
+    }
+
+    fn values(&self, i: usize) -> Values {
+        let Sample { light: [r, g, b], noise, .. } = self.samples[i];
+        [r, g, b, noise].map(f64::from)
     }
 
     fn weight(&self, i: usize) -> f64 {
@@ -196,19 +218,19 @@ impl Grid<'_> {
 const NOWHERE: usize = RADII.len();
 
 /// The plane by least squares through places with these sums, at one of them that weighs `own`.
-fn plane(sums: &[f64; 15], at: DVec2, own: f64) -> Option<Fit> {
-    let [n, x, y, xx, xy, yy, of_bands @ ..] = *sums;
+fn plane(sums: &[f64; 18], at: DVec2, own: f64) -> Option<Fit> {
+    let [n, x, y, xx, xy, yy, of_values @ ..] = *sums;
     let middle = DVec2::new(x, y) / n;
     let (xx, xy, yy) =
         (xx / n - middle.x * middle.x + RIDGE, xy / n - middle.x * middle.y, yy / n - middle.y * middle.y + RIDGE);
     let away = at - middle;
     let way = DVec2::new(yy * away.x - xy * away.y, xx * away.y - xy * away.x) / (xx * yy - xy * xy);
     let share = own * (1.0 + way.dot(away)) / n;
-    let light = std::array::from_fn(|k| {
-        let [z, zx, zy] = [0, 1, 2].map(|m| of_bands[3 * k + m] / n);
+    let values = std::array::from_fn(|k| {
+        let [z, zx, zy] = [0, 1, 2].map(|m| of_values[3 * k + m] / n);
         z + way.dot(DVec2::new(zx, zy) - z * middle)
     });
-    (share < ALONE).then_some(Fit { light, share })
+    (share < ALONE).then_some(Fit { values, share })
 }
 
 /// Sums over rectangles of a grid (summed-area table; Crow 1984).

@@ -9,6 +9,7 @@
 mod corners;
 mod planes;
 
+use crate::pool::Pooled;
 use corners::{Cell, Corners};
 use glam::DVec2;
 pub use planes::{FLAT, Finding, Planes};
@@ -61,14 +62,37 @@ impl Field {
     /// The same from two halves of the rays that found the values: cells of a plane share them first, as far as their light is
     /// smooth.
     pub fn pooled(mesh: &Mesh, elements: &Elements, halves: &[[Bands; 2]], weight: &[f64]) -> Field {
+        let [field] = Field::moved(mesh, elements, halves, weight, [0.0]);
+        field
+    }
+
+    /// That light as either half of the rays alone would have it, shared as both together are: half the difference of the two
+    /// is the noise that sharing and interpolation leave.
+    pub fn pooled_halves(mesh: &Mesh, elements: &Elements, halves: &[[Bands; 2]], weight: &[f64]) -> [Field; 2] {
+        Field::moved(mesh, elements, halves, weight, [1.0, -1.0])
+    }
+
+    /// Pooled light, and as many times its noise.
+    fn moved<const N: usize>(
+        mesh: &Mesh,
+        elements: &Elements,
+        halves: &[[Bands; 2]],
+        weight: &[f64],
+        times: [f32; N],
+    ) -> [Field; N] {
         let corners = Corners::new(mesh, elements);
         let mean = |[a, b]: &[Bands; 2]| std::array::from_fn(|band| 0.5 * (a[band] + b[band]));
         let mut cells = Cell::all(elements, &halves.iter().map(mean).collect::<Vec<Bands>>(), weight);
-        for (cell, shared) in cells.iter_mut().zip(planes::shared(mesh, elements, halves, weight)) {
-            cell.value = shared.unwrap_or(cell.value);
-        }
-        let values = corners.fitted(&cells);
-        Field { base: corners.base, division: corners.division, values }
+        let shared = planes::shared(mesh, elements, halves, weight);
+        times.map(|times| {
+            for (cell, shared) in cells.iter_mut().zip(&shared) {
+                if let Some(Pooled { light, noise, .. }) = shared {
+                    cell.value = light.map(|e| f64::from((e + times * noise).max(0.0)));
+                }
+            }
+            let values = corners.fitted(&cells);
+            Field { base: corners.base.clone(), division: corners.division.clone(), values }
+        })
     }
 
     /// By cell, whether it shares a corner with one of `cells`, or is one.

@@ -15,7 +15,7 @@ impl Atlas {
     /// taken for light.
     pub fn pooled(&self, page: usize, texels: &[Texel], values: &[Bands], noise: &[Bands]) -> Vec<Pooled> {
         assert_eq!((texels.len(), texels.len()), (values.len(), noise.len()));
-        let mut out: Vec<Pooled> = values.iter().map(|light| Pooled { light: *light, own: 1.0 }).collect();
+        let mut out: Vec<Pooled> = values.iter().map(|light| Pooled::alone(*light, 0.0)).collect();
         let Some(&[width, height]) = self.pages.get(page) else { return out };
         let mut index = vec![NONE; width as usize * height as usize];
         for (i, texel) in texels.iter().enumerate() {

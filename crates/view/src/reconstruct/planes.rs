@@ -42,7 +42,7 @@ pub struct Finding {
     pub side: Side,
     /// Light, lx per band.
     pub light: Bands,
-    /// Standard error of its luminance, lx.
+    /// Standard error of its luminance, lx; negative where it is told by two halves of the rays and the second found more.
     pub noise: f32,
     /// In proportion to the rays, about.
     pub weight: f64,
@@ -103,7 +103,7 @@ impl Planes {
                 by_plane[plane].push(i);
             }
         }
-        let mut out: Vec<Pooled> = found.iter().map(|f| Pooled { light: f.light, own: 1.0 }).collect();
+        let mut out: Vec<Pooled> = found.iter().map(|f| Pooled::alone(f.light, f.noise)).collect();
         let of_plane = |(plane, own): (&Plane, &Vec<usize>)| plane.pooled(found, own);
         let all: Vec<Vec<Pooled>> = self.planes.par_iter().zip(&by_plane).map(of_plane).collect();
         for (own, light) in by_plane.iter().zip(all) {
@@ -192,20 +192,20 @@ fn of_cell(mesh: &Mesh, elements: &Elements, cell: usize, halves: &[[Bands; 2]],
         triangle,
         side,
         light: std::array::from_fn(|band| 0.5 * (first[band] + second[band])),
-        noise: 0.5 * (luminance(first) - luminance(second)).abs(),
+        noise: 0.5 * (luminance(first) - luminance(second)),
         weight: rays,
     })
 }
 
 /// The light of all cells, shared with others of their plane as far as it is smooth; nothing where a cell is buried.
-pub(super) fn shared(mesh: &Mesh, elements: &Elements, halves: &[[Bands; 2]], weight: &[f64]) -> Vec<Option<[f64; 3]>> {
+pub(super) fn shared(mesh: &Mesh, elements: &Elements, halves: &[[Bands; 2]], weight: &[f64]) -> Vec<Option<Pooled>> {
     let found = |cell| Some((cell, of_cell(mesh, elements, cell, halves, weight)?));
     let (cells, found): (Vec<usize>, Vec<Finding>) = (0..elements.cells()).filter_map(found).unzip();
-    let mut light = vec![None; elements.cells()];
+    let mut all = vec![None; elements.cells()];
     for (cell, pooled) in cells.into_iter().zip(Planes::new(mesh, elements).pooled(&found)) {
-        light[cell] = Some(pooled.light.map(f64::from));
+        all[cell] = Some(pooled);
     }
-    light
+    all
 }
 
 #[cfg(test)]
