@@ -242,7 +242,6 @@ mod tests {
             let solution = Solution::new(&tracer, &options, &()).unwrap();
             for rays in [32, 256] {
                 let [told, apart] = told_and_true(&solution, rays);
-                println!("{rays} rays: told {told}, true {apart}");
                 assert!(told < 1.5 * apart && apart < 1.5 * told, "{rays} rays: told {told}, true {apart}");
             }
         }
