@@ -87,7 +87,7 @@ impl Field {
         times.map(|times| {
             for (cell, shared) in cells.iter_mut().zip(&shared) {
                 if let Some(Pooled { light, noise, .. }) = shared {
-                    cell.value = light.map(|e| f64::from((e + times * noise).max(0.0)));
+                    cell.value = light.map(|e| f64::from(e + times * noise));
                 }
             }
             let values = corners.fitted(&cells);
