@@ -86,15 +86,26 @@ impl Solution<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Answer, Error> {
         let direct = self.direct_at(places, shadowing, monitor)?;
-        let halves = self.stages.time(monitor, "gather", || {
-            self.gather().irradiance(&PointReceivers { places, shaded: &[] }, rays, &Watch(monitor))
-        })?;
+        let halves = self.halves_at(places, rays, 0, monitor)?;
         let mut answer = Answer { direct, ..Answer::default() };
         for ([a, b], d) in halves.iter().zip(&answer.direct) {
             answer.irradiance.push(std::array::from_fn(|k| d[k] + 0.5 * (a[k] + b[k])));
             answer.standard_error.push(std::array::from_fn(|k| 0.5 * (a[k] - b[k]).abs()));
         }
         Ok(answer)
+    }
+
+    /// The indirect part of it, by halves of the rays; each `salt` has rays of its own.
+    pub(crate) fn halves_at(
+        &self,
+        places: &[Place],
+        rays: usize,
+        salt: u32,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<[Bands; 2]>, Error> {
+        let receivers = PointReceivers { places, shaded: &[], salt };
+        let gather = || self.gather().irradiance(&receivers, rays, &Watch(monitor));
+        Ok(self.stages.time(monitor, "gather", gather)?)
     }
 
     /// Direct irradiance of all lights at places.
@@ -107,8 +118,19 @@ impl Solution<'_> {
         shadowing: &Shadowing,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
+        self.direct_by(places, shadowing, 0, monitor)
+    }
+
+    /// The same; each `salt` has shadow rays of its own.
+    pub(crate) fn direct_by(
+        &self,
+        places: &[Place],
+        shadowing: &Shadowing,
+        salt: u32,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Bands>, Error> {
         let shaded: Vec<bool> = places.par_iter().map(|place| self.may_be_shaded(place)).collect();
-        let receivers = PointReceivers { places, shaded: &shaded };
+        let receivers = PointReceivers { places, shaded: &shaded, salt };
         let columns = self.stages.time(monitor, "direct light", || {
             self.luminaires.columns(self.tracer(), &receivers, shadowing, &Watch(monitor))
         })?;

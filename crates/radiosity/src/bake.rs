@@ -32,7 +32,7 @@ const SOLUTIONS: f64 = 2.0;
 
 /// Shadow rays at a point for each of its gather rays, at least. In a furnished office 256 of either leave 1.3 % of noise each;
 /// shadow rays cost a fifth, and texels pool what they gather alone.
-pub(crate) const SHADOW_RAYS: u32 = 4;
+const SHADOW_RAYS: u32 = 4;
 
 /// Rays of the first gather.
 pub(crate) fn gather_rays(error: f64) -> usize {

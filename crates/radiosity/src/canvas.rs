@@ -1,17 +1,18 @@
 //! What a lightmap is drawn on: the faces that carry light, laid flat, and how texels are lit. Drawn again with more texels,
 //! it keeps what it knows: only where the map before was rough are texels lit anew.
 
-use crate::answer::{Answer, Station};
+use crate::answer::Station;
 use crate::faces::{Face, faces, is_hidden};
 use crate::judge::{Judge, WrittenRound};
+use crate::texels::{self, Sheet};
 use crate::{Error, Monitor, Solution, stations};
 use radiosity_scene::{Bands, Side};
 use radiosity_trace::Tracer;
+use radiosity_view::Audit;
 use radiosity_view::lightmap::{
     Atlas, Charts, Detail, SeamInfo, SeamParams, SharedEdge, Texel, UnwrapInput, UnwrapParams, fill, fit_seams,
     look_up, shared_edges,
 };
-use radiosity_view::{Audit, Pooled};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -181,19 +182,16 @@ impl<'b, 'a> Canvas<'b, 'a> {
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error> {
         let at = self.stations(texels);
-        let Answer { irradiance, direct, standard_error } = judge.light(&at, 1, monitor)?;
-        let hidden: Vec<bool> = at.iter().map(|station| is_hidden(self.solution, station)).collect();
-        let unless_hidden = |i: usize, e: Bands| if hidden[i] { [f32::NAN; 3] } else { e };
-        if !judge.gathers() {
-            let light = irradiance.iter().enumerate().map(|(i, e)| unless_hidden(i, *e)).collect();
-            return Ok(Lit { light, smooth: vec![None; texels.len()] });
+        let shown: Vec<usize> =
+            (0..texels.len()).into_par_iter().filter(|&i| !is_hidden(self.solution, &at[i])).collect();
+        let (own, at): (Vec<Texel>, Vec<Station>) = shown.iter().map(|&i| (texels[i], at[i])).unzip();
+        let found = texels::light(judge.baked(), Sheet { atlas, page, texels: &own }, &at, judge.gathers(), monitor)?;
+        let (mut light, mut smooth) = (vec![[f32::NAN; 3]; texels.len()], vec![None; texels.len()]);
+        for (&i, (d, p)) in shown.iter().zip(found.direct.iter().zip(&found.indirect)) {
+            light[i] = std::array::from_fn(|k| d[k] + p.light[k]);
+            smooth[i] = (p.own < SMOOTH).then_some(p.light);
         }
-        let difference = |i: usize| std::array::from_fn(|k| irradiance[i][k] - direct[i][k]);
-        let indirect: Vec<Bands> = (0..texels.len()).map(|i| unless_hidden(i, difference(i))).collect();
-        let pooled = atlas.pooled(page, texels, &indirect, &standard_error);
-        let smooth = pooled.iter().map(|p| (p.own < SMOOTH).then_some(p.light)).collect();
-        let sum = |(d, p): (&Bands, &Pooled)| std::array::from_fn(|k| d[k] + p.light[k]);
-        Ok(Lit { light: direct.iter().zip(&pooled).map(sum).collect(), smooth })
+        Ok(Lit { light, smooth })
     }
 
     /// Further points of texels, whose indirect light may be known.
@@ -205,21 +203,16 @@ impl<'b, 'a> Canvas<'b, 'a> {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
         let at = self.stations(points);
-        let (smooth, rest): (Vec<usize>, Vec<usize>) = (0..points.len()).partition(|i| indirect[*i].is_some());
-        let of = |chosen: &[usize]| -> Vec<Station> { chosen.iter().map(|i| at[*i]).collect() };
         let mut values = vec![[f32::NAN; 3]; points.len()];
-        if !smooth.is_empty() {
-            for (i, direct) in smooth.iter().zip(judge.direct(&of(&smooth), EDGE_POINTS, monitor)?) {
-                values[*i] = std::array::from_fn(|k| direct[k] + indirect[*i].map_or(0.0, |light| light[k]));
-            }
+        let shown: Vec<usize> =
+            (0..points.len()).into_par_iter().filter(|&i| !is_hidden(self.solution, &at[i])).collect();
+        let (smooth, rest): (Vec<usize>, Vec<usize>) = shown.into_iter().partition(|i| indirect[*i].is_some());
+        let of = |chosen: &[usize]| -> Vec<Station> { chosen.iter().map(|i| at[*i]).collect() };
+        for (i, direct) in smooth.iter().zip(judge.direct(&of(&smooth), EDGE_POINTS, monitor)?) {
+            values[*i] = std::array::from_fn(|k| direct[k] + indirect[*i].map_or(0.0, |light| light[k]));
         }
-        if !rest.is_empty() {
-            for (i, light) in rest.iter().zip(judge.light(&of(&rest), EDGE_POINTS, monitor)?.irradiance) {
-                values[*i] = light;
-            }
-        }
-        for (value, _) in values.iter_mut().zip(&at).filter(|(_, station)| is_hidden(self.solution, station)) {
-            *value = [f32::NAN; 3];
+        for (i, light) in rest.iter().zip(judge.light(&of(&rest), EDGE_POINTS, monitor)?.irradiance) {
+            values[*i] = light;
         }
         Ok(values)
     }

@@ -6,7 +6,7 @@
 //! where they are read back stand for what points make of their rays together.
 
 use crate::answer::{Answer, Station};
-use crate::bake::{Baked, GATHERS, SHADOW_RAYS, gather_rays};
+use crate::bake::{Baked, GATHERS, gather_rays};
 use crate::measure::{brought_nothing, certify, most_paths};
 use crate::{Error, Indirect, Monitor, Solution, stations};
 use radiosity_scene::{Bands, luminance};
@@ -38,9 +38,18 @@ pub(crate) fn is_stalled(rounds: &[WrittenRound]) -> bool {
 /// Fewest shadow rays, and gather rays, at a point that is one of many.
 const LEAST_RAYS: u32 = 8;
 
-/// Gather rays at a point that shares with others, at least, unless the error allows for fewer: small things have few texels to
-/// share with, and half as many rays would leave theirs as different as checks are.
-const LEAST_POOLED: usize = 64;
+/// Shadow rays of all further points of a texel together, for each gather ray that they have: as many as the first points of texels have
+/// where light is rough, so that an edge is as quiet as what is beside it.
+const SHADOW_RAYS: usize = 2;
+
+/// As what light is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Written {
+    /// Each vertex has the rays that places have at which light is read back.
+    Vertices,
+    /// Texels have rays by the error asked and their noise ([`crate::texels`]).
+    Texels,
+}
 
 /// One attempt at writing light so that it is read back as well as was asked.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -82,8 +91,7 @@ pub(crate) struct Judge<'b, 'a> {
     auditor: Auditor<'a>,
     gather: usize,
     shadowing: Shadowing,
-    /// How many times fewer gather rays do for points that are written: they share theirs with those around them.
-    pooled: usize,
+    written: Written,
     /// The solution's light at the places of the audit.
     at: Vec<Bands>,
     /// Further places where written light is compared with the solution, and its illuminance there.
@@ -95,9 +103,9 @@ pub(crate) struct Judge<'b, 'a> {
 }
 
 impl<'b, 'a> Judge<'b, 'a> {
-    pub fn new(baked: &'b Baked<'a>, pooled: usize) -> Judge<'b, 'a> {
+    pub fn new(baked: &'b Baked<'a>, written: Written) -> Judge<'b, 'a> {
         Judge {
-            pooled,
+            written,
             baked,
             auditor: baked.auditor.clone(),
             gather: baked.gather,
@@ -108,6 +116,11 @@ impl<'b, 'a> Judge<'b, 'a> {
             is_close: false,
             is_relit: false,
         }
+    }
+
+    /// What is judged.
+    pub fn baked(&self) -> &'b Baked<'a> {
+        self.baked
     }
 
     /// Every place at which light will be read back.
@@ -121,7 +134,7 @@ impl<'b, 'a> Judge<'b, 'a> {
     /// # Errors
     /// [`Error::Stopped`].
     pub fn light(&self, stations: &[Station], of: u32, monitor: &dyn Monitor) -> Result<Answer, Error> {
-        let gather = if self.gathers() { (self.written() / of as usize).max(LEAST_RAYS as usize) } else { 0 };
+        let gather = if self.gathers() { (self.rays().0 / of as usize).max(LEAST_RAYS as usize) } else { 0 };
         self.lit(stations, gather, &self.shared(of), monitor)
     }
 
@@ -156,15 +169,20 @@ impl<'b, 'a> Judge<'b, 'a> {
         Ok(self.lit(places, self.gather, &self.shadowing, monitor)?.irradiance)
     }
 
-    /// Gather rays of a point that is written alone.
-    fn written(&self) -> usize {
-        let least = gather_rays(self.baked.error).min(LEAST_POOLED).max(self.baked.gather);
-        (self.gather / self.pooled).max(least)
+    /// Gather rays and shadow rays of a vertex, or of all further points of a texel.
+    fn rays(&self) -> (usize, u32) {
+        match self.written {
+            Written::Vertices => (self.gather, self.shadowing.rays),
+            Written::Texels => {
+                let gather = gather_rays(self.baked.error);
+                (gather, (SHADOW_RAYS * gather) as u32)
+            }
+        }
     }
 
     /// Shadow rays of each of so many points.
     fn shared(&self, of: u32) -> Shadowing {
-        let rays = self.shadowing.rays;
+        let rays = self.rays().1;
         let rays = if of > 1 { (rays / of).max(LEAST_RAYS) } else { rays };
         Shadowing { rays, ..self.shadowing }
     }
@@ -231,16 +249,12 @@ impl<'b, 'a> Judge<'b, 'a> {
         if upper <= enough || std::mem::replace(&mut self.is_relit, true) {
             return Ok(false);
         }
-        let written = |judge: &Judge| (judge.gathers(), judge.written(), judge.shadowing.rays);
+        let written = |judge: &Judge| (judge.gathers(), judge.rays());
         let (mut is_better, before) = (false, written(self));
         let (mut gather, mut shadowing) = (self.gather, self.shadowing);
         for _ in 0..GATHERS {
             gather = (2 * gather).max(gather_rays(self.baked.error));
-            // Points that pool have shadow rays in proportion to what they gather: direct light is not shared.
-            shadowing.rays = match self.pooled {
-                1 => 2 * shadowing.rays,
-                pooled => shadowing.rays.max(SHADOW_RAYS * (gather / pooled) as u32),
-            };
+            shadowing.rays *= 2;
             let kept = (self.gather, self.shadowing);
             (self.gather, self.shadowing) = (gather, shadowing);
             let at = self.at_places(&self.baked.watched, monitor)?;

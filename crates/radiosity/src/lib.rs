@@ -36,6 +36,7 @@ pub mod render;
 pub mod session;
 mod solution;
 pub mod stations;
+mod texels;
 mod vertex_light;
 mod viewpoint;
 

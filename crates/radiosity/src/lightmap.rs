@@ -3,7 +3,7 @@
 use crate::bake::Baked;
 use crate::canvas::Canvas;
 use crate::faces::lit_vertex;
-use crate::judge::{Judge, STEP, WrittenRound, is_stalled, root_mean_square};
+use crate::judge::{Judge, STEP, Written, WrittenRound, is_stalled, root_mean_square};
 use crate::monitor::is_over;
 use crate::{Error, Monitor};
 use glam::DVec2;
@@ -83,10 +83,6 @@ const STEP_BACK: f64 = 1.5;
 /// Rounds after the first map: two or three of finer texels, one to mend what the estimate had wrong.
 const ROUNDS: usize = 4;
 
-/// Gathered light of a texel that is pooled has the noise of so many times its rays at least, on surfaces wider than a few texels:
-/// on walls, of thirty times as many. More would leave small things unlike each other, less would light all texels anew.
-const POOLED: usize = 4;
-
 /// Texels of so many charts where no density is asked for.
 pub(crate) fn automatic_texels(charts: usize) -> f64 {
     AUTOMATIC_TEXELS.max(CHART_TEXELS * charts as f64)
@@ -117,7 +113,7 @@ pub fn lightmap(
     if texels > most {
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
-    let mut judge = Judge::new(baked, POOLED);
+    let mut judge = Judge::new(baked, Written::Texels);
     let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
     let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
     let mut rounds = vec![drawn.round(&audit)];

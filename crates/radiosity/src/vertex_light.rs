@@ -7,7 +7,7 @@
 use crate::answer::Station;
 use crate::bake::Baked;
 use crate::faces::{Face, faces, is_hidden, lit_vertex};
-use crate::judge::{Judge, STEP, WrittenRound, is_stalled, root_mean_square};
+use crate::judge::{Judge, STEP, Written, WrittenRound, is_stalled, root_mean_square};
 use crate::monitor::is_over;
 use crate::{Error, Monitor, Solution, stations};
 use glam::DVec2;
@@ -45,7 +45,7 @@ const ROUNDS: usize = 4;
 pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight, Error> {
     let solution = &baked.solution;
     let faces = faces(solution);
-    let mut judge = Judge::new(baked, 1);
+    let mut judge = Judge::new(baked, Written::Vertices);
     let mut division: Vec<u32> =
         (0..solution.tracer().mesh.triangles.len()).map(|t| solution.elements.division(t)).collect();
     let mut known = HashMap::new();

@@ -129,7 +129,7 @@ fn lamps_with_pictures_are_counted_once() {
     assert!(!dark.is_empty() && dark.iter().all(|&e| solution.luminaires.promoted[e] == [0.0; 4]));
     assert!(solution.luminaires.carries(elements.place(dark[0] as u32).0, Side::Front));
     let places = [Place { point: DVec3::new(0.1, 0.1, 0.0), normal: DVec3::Z, triangle: u32::MAX }];
-    let receivers = PointReceivers { places: &places, shaded: &[] };
+    let receivers = PointReceivers { places: &places, shaded: &[], salt: 0 };
     assert_eq!(solution.gather().irradiance(&receivers, 256, &()).unwrap(), [[[0.0; 3]; 2]]);
 }
 

@@ -477,7 +477,7 @@ mod tests {
     fn illuminance(scene: &Scene, places: &[Place], rays: u32) -> Vec<f64> {
         let (mesh, luminaires) = prepared(scene);
         let tracer = Tracer::new(scene, &mesh);
-        let receivers = PointReceivers { places, shaded: &[] };
+        let receivers = PointReceivers { places, shaded: &[], salt: 0 };
         let columns = luminaires.columns(&tracer, &receivers, &Shadowing { places: 1, rays }, &()).unwrap();
         (0..places.len()).map(|i| f64::from(columns.mean(i)[1])).collect()
     }

@@ -182,6 +182,8 @@ pub struct PointReceivers<'a> {
     pub places: &'a [Place],
     /// Whether any light may be hidden from each, as shadow rays of its surroundings say; empty if nothing is known.
     pub shaded: &'a [bool],
+    /// Another number makes other random choices at the same places.
+    pub salt: u32,
 }
 
 impl Receivers for PointReceivers<'_> {
@@ -214,7 +216,7 @@ impl Receivers for PointReceivers<'_> {
     fn seed(&self, i: usize) -> u32 {
         // From the position, so that a point's answer does not depend on its number in the list.
         let p = self.places[i].point;
-        [p.x, p.y, p.z].iter().fold(0x51ed_270b, |seed, x| {
+        [p.x, p.y, p.z].iter().fold(0x51ed_270b ^ self.salt, |seed, x| {
             let bits = x.to_bits();
             radiosity_trace::sampling::hash(seed ^ bits as u32 ^ (bits >> 32) as u32)
         })

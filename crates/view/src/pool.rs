@@ -57,12 +57,14 @@ pub struct Pooled {
     pub own: f32,
     /// What is left of the noise, lx, where those that were given have signs: it is shared as light is.
     pub noise: f32,
+    /// How large that is to be expected by the noise of the places around, whatever its signs: its standard error, lx.
+    pub spread: f32,
 }
 
 impl Pooled {
     /// A place that shares with no other.
     pub(crate) fn alone(light: Bands, noise: f32) -> Pooled {
-        Pooled { light, own: 1.0, noise }
+        Pooled { light, own: 1.0, noise, spread: noise.abs() }
     }
 }
 
@@ -179,19 +181,25 @@ impl Grid<'_> {
             }
             let [count, sum] = evened.within(self, i, EVENED);
             let at = sum / count;
-            let near = |k: f64| Some(plane(i, RADII[k as usize]).or_else(|| plane(i, RADII[chosen]))?.values);
+            let near = |k: f64| plane(i, RADII[k as usize]).or_else(|| plane(i, RADII[chosen]));
             let (low, high, share) = (near(at.floor())?, near(at.ceil())?, at.fract());
             let [count, weight, sum] = variance.within(self, i, COMPARED);
             // Of so many places a variance is known to √(2/n) of itself: less than twice that beyond the noise is chance.
             let noise = sum / weight * (1.0 + (8.0 / count).sqrt());
             let kept = if missed > 0.0 { (1.0 - noise / missed).clamp(0.0, 1.0) } else { 0.0 };
+            let between = |low: f64, high: f64| low + share * (high - low);
             let own = self.values(i);
             let [r, g, b, noise]: Values = std::array::from_fn(|k| {
-                let shared = low[k] + share * (high[k] - low[k]);
+                let shared = between(low.values[k], high.values[k]);
                 shared + kept * (own[k] - shared)
             });
             let light = [r, g, b].map(|e| e.max(0.0) as f32);
-            Some(Pooled { light, own: kept as f32, noise: noise as f32 })
+            // The variance of a plane at one of its places is the share h that this has of it, times that of the place alone (the
+            // leverage of least squares); beside it the place keeps a part of its own, which h counts already.
+            let h = between(low.share, high.share);
+            let part = kept * kept + (1.0 - kept * kept) * h;
+            let spread = (sum.max(0.0) / count / self.weight(i) * part).sqrt();
+            Some(Pooled { light, own: kept as f32, noise: noise as f32, spread: spread as f32 })
         };
         (0..self.samples.len()).map(light).collect()
     }
@@ -322,6 +330,25 @@ mod tests {
         let [all, bias] = off(&pooled, truth, |_, _| true);
         let [border, _] = off(&pooled, truth, |x, y| x.min(y) < 1.0 || x.max(y) > SIDE as f64 - 2.0);
         assert!(all < 0.14 && border < 0.3 && bias.abs() < 0.05, "{all} {border} {bias}");
+    }
+
+    /// What is told to be left of the noise is what is left: where light is smooth, and where each keeps its own.
+    #[test]
+    fn the_noise_that_is_left_is_as_told() {
+        let smooth = |x: f64, y: f64| 40.0 + 0.3 * x - 0.2 * y;
+        let rough = |x: f64, y: f64| 40.0 + 30.0 * unit(hash(x as u32 ^ hash(y as u32))) as f64;
+        let told = |pooled: &[Pooled]| {
+            let square = |p: &Pooled| f64::from(p.spread).powi(2);
+            (pooled.iter().map(square).sum::<f64>() / pooled.len() as f64).sqrt()
+        };
+        for seed in 1..4 {
+            let of = pooled(&noisy(smooth, seed), 1.0);
+            let ([off, _], told) = (off(&of, smooth, |_, _| true), told(&of));
+            assert!(told > 0.7 * off && told < 1.6 * off, "{told} {off}");
+        }
+        let of = pooled(&noisy(rough, 1), 1.0);
+        let ([off, _], told) = (off(&of, rough, |_, _| true), told(&of));
+        assert!((told / off - 1.0).abs() < 0.1, "{told} {off}");
     }
 
     #[test]

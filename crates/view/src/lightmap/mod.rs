@@ -148,6 +148,8 @@ struct Placed {
     collapsed: [Option<f64>; 2],
     /// Texels along the axes, not yet rotated.
     size: [u32; 2],
+    /// m².
+    area: f64,
     at: Placement,
 }
 
@@ -196,6 +198,7 @@ impl Charts {
                 local: chart.local.iter().map(|corners| corners.map(|p| p * stretch)).collect(),
                 collapsed: axes.map(|axis| axis.collapsed),
                 size: axes.map(|axis| axis.count),
+                area: chart.area,
                 at: Placement::default(),
             });
         }

@@ -1,44 +1,109 @@
-//! Texels of a chart share what they gathered ([`pooled`]).
+//! Texels of a chart share what they gathered ([`pooled`]), and what they know of its noise.
 
 use super::{Atlas, Placed, Texel};
 use crate::pool::{Pooled, Sample, pooled};
 use glam::DVec2;
-use radiosity_scene::{Bands, luminance};
+use radiosity_scene::Bands;
 use rayon::prelude::*;
 
 /// The number of a slot without a texel.
 const NONE: u32 = u32::MAX;
 
+/// Texels around one, along each axis, that tell the noise of its rays: twenty-five know it to a seventh or better, and a shadow's
+/// edge is not wider.
+const AROUND: u32 = 2;
+
+/// Charts of fewer texels than this ask those that come before and after them, up to so many texels away: most are parts of one thing.
+const FEW: usize = 9;
+
 impl Atlas {
-    /// Pooled light of `texels` of a page: `values[i]`, lx per band, and its standard error `noise[i]` belong to `texels[i]`, each
-    /// named once. What is not finite stays as it is. Noise of one texel must not be that of another: a part that they share is
-    /// taken for light.
-    pub fn pooled(&self, page: usize, texels: &[Texel], values: &[Bands], noise: &[Bands]) -> Vec<Pooled> {
-        assert_eq!((texels.len(), texels.len()), (values.len(), noise.len()));
-        let mut out: Vec<Pooled> = values.iter().map(|light| Pooled::alone(*light, 0.0)).collect();
-        let Some(&[width, height]) = self.pages.get(page) else { return out };
-        let mut index = vec![NONE; width as usize * height as usize];
-        for (i, texel) in texels.iter().enumerate() {
-            if values[i].iter().chain(&noise[i]).all(|e| e.is_finite()) {
-                index[usize::from(texel.y) * width as usize + usize::from(texel.x)] = i as u32;
-            }
-        }
-        let charts: Vec<&Placed> = self.charts.iter().filter(|chart| chart.at.page as usize == page).collect();
-        let of_chart = |chart: &&Placed| -> Vec<(usize, Pooled)> {
-            let [columns, rows] = chart.size;
-            let slots = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-            let texel = |(column, row)| {
-                let i = index[chart.slot(column, row, width)];
-                (i != NONE).then(|| (i as usize, DVec2::new(f64::from(column), f64::from(row))))
-            };
+    /// Pooled light of `texels` of a page: `values[i]`, lx per band, its standard error `noise[i]`, lx, and its number of rays belong to
+    /// `texels[i]`, each named once. What is not finite stays as it is. Noise of one texel must not be that of another: a part that they
+    /// share is taken for light.
+    pub fn pooled(&self, page: usize, texels: &[Texel], values: &[Bands], noise: &[f32], rays: &[u32]) -> Vec<Pooled> {
+        assert_eq!([texels.len(); 3], [values.len(), noise.len(), rays.len()]);
+        let mut out: Vec<Pooled> = values.iter().zip(noise).map(|(light, s)| Pooled::alone(*light, *s)).collect();
+        let is_known = |i: usize| values[i].iter().chain([&noise[i]]).all(|e| e.is_finite());
+        let of_chart = |slots: &[Option<usize>], columns: u32| -> Vec<(usize, Pooled)> {
+            let at = |slot: usize| DVec2::new((slot % columns as usize) as f64, (slot / columns as usize) as f64);
             let (own, samples): (Vec<usize>, Vec<Sample>) = slots
-                .filter_map(texel)
-                .map(|(i, at)| (i, Sample { at, light: values[i], noise: luminance(noise[i]), weight: 1.0 }))
+                .iter()
+                .enumerate()
+                .filter_map(|(slot, i)| i.map(|i| (slot, i)))
+                .map(|(slot, i)| {
+                    (i, Sample { at: at(slot), light: values[i], noise: noise[i], weight: rays[i] as f32 })
+                })
                 .unzip();
             own.into_iter().zip(pooled(&samples, &[])).collect()
         };
-        let found: Vec<Vec<(usize, Pooled)>> = charts.par_iter().map(of_chart).collect();
-        found.into_iter().flatten().for_each(|(i, value)| out[i] = value);
+        for (i, value) in self.by_chart(page, texels, is_known, of_chart).into_iter().flatten() {
+            out[i] = value;
+        }
         out
+    }
+
+    /// The standard error of each of `texels`, lx, where two halves of its rays differ by `noise` from their mean: a root mean square over
+    /// the texels around, as a difference says little by itself. What is not finite says nothing.
+    pub fn evened(&self, page: usize, texels: &[Texel], noise: &[f32]) -> Vec<f32> {
+        assert_eq!(texels.len(), noise.len());
+        let square = |i: usize| f64::from(noise[i]).powi(2);
+        let mean = |squares: &mut dyn Iterator<Item = f64>| {
+            let (sum, count) = squares.fold((0.0, 0), |(sum, count), s| (sum + s, count + 1));
+            (sum / f64::from(count.max(1))).sqrt() as f32
+        };
+        let of_chart = |slots: &[Option<usize>], columns: u32| -> Vec<(usize, Option<f32>)> {
+            let own = slots.iter().flatten().count();
+            let rows = slots.len() as u32 / columns;
+            let around = |slot: u32| {
+                let (x, y) = (slot % columns, slot / columns);
+                let near = |x: u32, count: u32| x.saturating_sub(AROUND)..(x + AROUND + 1).min(count);
+                let slots =
+                    near(y, rows).flat_map(|y| near(x, columns).map(move |x| &slots[(y * columns + x) as usize]));
+                mean(&mut slots.flatten().map(|i| square(*i)))
+            };
+            let tell = |(slot, i): (usize, &Option<usize>)| i.map(|i| (i, (own >= FEW).then(|| around(slot as u32))));
+            slots.iter().enumerate().filter_map(tell).collect()
+        };
+        let found = self.by_chart(page, texels, |i| noise[i].is_finite(), of_chart).concat();
+        let mut out = vec![f32::NAN; texels.len()];
+        for (k, (i, told)) in found.iter().enumerate() {
+            let run = &found[k.saturating_sub(FEW)..(k + FEW + 1).min(found.len())];
+            out[*i] = told.unwrap_or_else(|| mean(&mut run.iter().map(|(i, _)| square(*i))));
+        }
+        out
+    }
+
+    /// Surface that each of `texels` stands for, m², those of one chart alike.
+    pub fn areas(&self, texels: &[Texel]) -> Vec<f64> {
+        let area = |texel: &Texel| {
+            let chart = &self.charts[self.triangle_chart[texel.triangle as usize] as usize];
+            chart.area / (f64::from(chart.size[0]) * f64::from(chart.size[1]))
+        };
+        texels.iter().map(area).collect()
+    }
+
+    /// What comes of the slots of each chart of a page, in the order of charts: by row, the number of the texel that is there, if it
+    /// is known.
+    fn by_chart<T: Send>(
+        &self,
+        page: usize,
+        texels: &[Texel],
+        is_known: impl Fn(usize) -> bool,
+        of_chart: impl Fn(&[Option<usize>], u32) -> T + Sync,
+    ) -> Vec<T> {
+        let Some(&[width, height]) = self.pages.get(page) else { return Vec::new() };
+        let mut index = vec![NONE; width as usize * height as usize];
+        for (i, texel) in texels.iter().enumerate().filter(|(i, _)| is_known(*i)) {
+            index[usize::from(texel.y) * width as usize + usize::from(texel.x)] = i as u32;
+        }
+        let charts: Vec<&Placed> = self.charts.iter().filter(|chart| chart.at.page as usize == page).collect();
+        let slots = |chart: &&Placed| {
+            let [columns, rows] = chart.size;
+            let slots = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+            let texel = |(column, row)| index[chart.slot(column, row, width)];
+            let slots: Vec<Option<usize>> = slots.map(texel).map(|i| (i != NONE).then_some(i as usize)).collect();
+            of_chart(&slots, columns)
+        };
+        charts.par_iter().map(slots).collect()
     }
 }

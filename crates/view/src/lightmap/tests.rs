@@ -1,4 +1,5 @@
 use super::*;
+use radiosity_trace::sampling::{hash, unit};
 use std::collections::HashMap;
 
 /// Owned input.
@@ -469,4 +470,42 @@ fn charts_end_below_walls() {
         let charts = Charts::new(&UnwrapInput { smooth: &smooth, ..mesh.input() }, &UnwrapParams::default()).unwrap();
         assert_eq!(charts.len(), expected);
     }
+}
+
+/// Halves of rays that differ by chance: what is told is their root mean square around, for large charts and for
+/// many small ones, whatever lies inside solids.
+#[test]
+fn noise_is_told_by_texels_around() {
+    let mut mesh = Mesh::default();
+    mesh.add_box(0, DVec3::ZERO, DVec3::splat(2.0), 0.0);
+    for i in 0..40 {
+        let low = DVec3::new(4.0 + 0.1 * f64::from(i), 0.0, 0.0);
+        mesh.add_box(1 + i, low, low + DVec3::splat(0.02), 0.0);
+    }
+    let charts = Charts::new(&mesh.input(), &UnwrapParams::default()).unwrap();
+    let atlas = charts.pack(&UnwrapParams::default()).unwrap();
+    let texels = atlas.texels(0);
+    let area: f64 = atlas.areas(&texels).iter().sum();
+    let whole = 6.0 * (4.0 + 40.0 * 0.0004);
+    assert!((area / whole - 1.0).abs() < 1e-9, "{area} of {whole}");
+    let draw = |i: u32, k: u32| f64::from(unit(hash(hash(i) ^ k)));
+    let normal = |i| (0..12).map(|k| draw(i, k)).sum::<f64>() - 6.0;
+    let size = |texel: &Texel| if texel.triangle < 12 { 1.0 } else { 8.0 };
+    let halves: Vec<f32> = (0..)
+        .zip(&texels)
+        .map(|(i, texel)| if i % 10 == 3 { f32::NAN } else { (size(texel) * normal(i)) as f32 })
+        .collect();
+    let told = atlas.evened(0, &texels, &halves);
+    let (mut worst, mut count) = ([0f64; 2], [0; 2]);
+    for ((texel, half), told) in texels.iter().zip(&halves).zip(&told) {
+        assert_eq!(half.is_finite(), told.is_finite());
+        if half.is_finite() {
+            let kind = usize::from(texel.triangle >= 12);
+            worst[kind] = worst[kind].max((f64::from(*told) / size(texel)).ln().abs());
+            count[kind] += 1;
+        }
+    }
+    // Eight deviates in a corner tell it to a quarter, and a factor of two and a half is beyond what chance makes of them.
+    assert!(count[0] > 8000 && count[1] > 200, "{count:?}");
+    assert!(worst.iter().all(|worst| *worst < 2.5f64.ln()), "{worst:?}");
 }
