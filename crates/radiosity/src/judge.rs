@@ -8,6 +8,8 @@
 use crate::answer::{Answer, Station};
 use crate::bake::{Baked, GATHERS, SHADOW_RAYS, gather_rays};
 use crate::measure::{brought_nothing, certify, most_paths};
+use crate::monitor::has_time;
+use crate::pace::{self, Cost};
 use crate::{Error, Indirect, Monitor, Solution, stations};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
@@ -41,6 +43,9 @@ const LEAST_RAYS: u32 = 8;
 /// Gather rays at a point that shares with others, at least, unless the error allows for fewer: small things have few texels to
 /// share with, and half as many rays would leave theirs as different as checks are.
 const LEAST_POOLED: usize = 64;
+
+/// Parts of their rays that some points are lit with to see how long that takes.
+const TIMED: [f64; 2] = [0.125, 0.5];
 
 /// One attempt at writing light so that it is read back as well as was asked.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -92,6 +97,10 @@ pub(crate) struct Judge<'b, 'a> {
     /// Whether these are looked at, and whether points were lit with more rays if that helps.
     is_close: bool,
     is_relit: bool,
+    /// The part of its rays that a point is lit with: all but where a deadline leaves less time.
+    thinned: f64,
+    /// Seconds that a place takes with all rays, where that had to be known.
+    each: f64,
 }
 
 impl<'b, 'a> Judge<'b, 'a> {
@@ -107,7 +116,45 @@ impl<'b, 'a> Judge<'b, 'a> {
             light: Vec::new(),
             is_close: false,
             is_relit: false,
+            thinned: 1.0,
+            each: 0.0,
         }
+    }
+
+    /// Where there is a deadline, finds with which part of their rays so many points are lit by it; `after` for that is kept for what is
+    /// done then, relative to it. Places where light is read back are timed: they are spread as points are.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn pace(&mut self, points: usize, after: f64, monitor: &dyn Monitor) -> Result<(), Error> {
+        if pace::left(monitor).is_none() || self.more.is_empty() {
+            return Ok(());
+        }
+        let (some, parts) = pace::sample(&self.more);
+        let mut times = [(0.0, 0.0); 2];
+        for (time, thinned) in times.iter_mut().zip(TIMED) {
+            self.thinned = thinned;
+            let (seconds, lit) = pace::timed(|| self.light(&some, 1, monitor).map(drop));
+            lit?;
+            *time = (thinned, seconds);
+        }
+        let points_for_each = points as f64 / self.more.len() as f64;
+        let cost = Cost::new(times, parts * points_for_each);
+        self.each = cost.seconds(1.0) / points.max(1) as f64;
+        let left = pace::left(monitor).unwrap_or(0.0) - self.baked.audit_seconds();
+        // Fewer rays than points have at least are not sent.
+        self.thinned = cost.rays(left / (1.0 + after), [0.0, 1.0]);
+        Ok(())
+    }
+
+    /// Whether points are lit with all their rays.
+    pub fn is_whole(&self) -> bool {
+        self.thinned >= 1.0
+    }
+
+    /// Seconds that the least audit takes.
+    pub fn audit_seconds(&self) -> f64 {
+        self.baked.audit_seconds()
     }
 
     /// Every place at which light will be read back.
@@ -159,14 +206,14 @@ impl<'b, 'a> Judge<'b, 'a> {
     /// Gather rays of a point that is written alone.
     fn written(&self) -> usize {
         let least = gather_rays(self.baked.error).min(LEAST_POOLED).max(self.baked.gather);
-        (self.gather / self.pooled).max(least)
+        thinned((self.gather / self.pooled).max(least), self.thinned)
     }
 
     /// Shadow rays of each of so many points.
     fn shared(&self, of: u32) -> Shadowing {
         let rays = self.shadowing.rays;
         let rays = if of > 1 { (rays / of).max(LEAST_RAYS) } else { rays };
-        Shadowing { rays, ..self.shadowing }
+        Shadowing { rays: thinned(rays as usize, self.thinned) as u32, ..self.shadowing }
     }
 
     /// Of light that is `read` back at places. Where that seems to be worse than what was asked, and the solution is not,
@@ -181,7 +228,8 @@ impl<'b, 'a> Judge<'b, 'a> {
         if !self.is_close {
             let plain = |auditor: &Auditor| auditor.judge(&read_back);
             let audit = certify(&mut self.auditor, plain, *error, paths, stages, monitor)?;
-            if audit.upper <= *error || !achieved {
+            let takes = self.each * self.more.len() as f64;
+            if audit.upper <= *error || !achieved || !has_time(monitor, takes) {
                 return Ok(audit);
             }
             // The edges that are left may be so narrow that no place of the audit meets one.
@@ -265,6 +313,11 @@ impl<'b, 'a> Judge<'b, 'a> {
         let Baked { error, stages, .. } = self.baked;
         certify(&mut self.auditor, |auditor| auditor.judge(at), target, most_paths(*error), stages, monitor)
     }
+}
+
+/// A part of some rays; no fewer than [`LEAST_RAYS`], unless there were fewer.
+fn thinned(rays: usize, part: f64) -> usize {
+    ((rays as f64 * part) as usize).max(rays.min(LEAST_RAYS as usize))
 }
 
 /// Root mean square illuminance over the exposed surfaces, lx: what relative errors are relative to.

@@ -85,7 +85,7 @@ const ROUNDS: usize = 4;
 
 /// Gathered light of a texel that is pooled has the noise of so many times its rays at least, on surfaces wider than a few texels:
 /// on walls, of thirty times as many. More would leave small things unlike each other, less would light all texels anew.
-const POOLED: usize = 4;
+pub(crate) const POOLED: usize = 4;
 
 /// Texels of so many charts where no density is asked for.
 pub(crate) fn automatic_texels(charts: usize) -> f64 {

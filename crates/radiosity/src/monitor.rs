@@ -161,6 +161,11 @@ impl Stages {
         }
     }
 
+    /// The seconds of a stage.
+    pub(crate) fn of(&self, name: &str) -> f64 {
+        self.all().into_iter().find(|(n, _)| n == name).map_or(0.0, |(_, seconds)| seconds)
+    }
+
     /// All stages with their seconds.
     pub fn all(&self) -> Vec<(String, f64)> {
         self.seconds.lock().unwrap_or_else(|e| e.into_inner()).clone()
