@@ -181,13 +181,13 @@ impl SolveArguments {
     }
 
     /// As the library takes them to light surfaces; what is displayed is judged at the exposure of the picture, if it is given.
-    pub fn bake(&self, picture: &PictureArguments) -> radiosity::BakeOptions {
+    pub fn bake(&self, picture: &PictureArguments, after: radiosity::After) -> radiosity::BakeOptions {
         let default = radiosity::BakeOptions::default();
         let mut solve = self.options();
         if let Some(displayed) = &mut solve.displayed {
             displayed.exposure = picture.exposure;
         }
-        radiosity::BakeOptions { error: self.error, solve, rounds: self.rounds, seed: self.seed, ..default }
+        radiosity::BakeOptions { error: self.error, solve, rounds: self.rounds, seed: self.seed, after, ..default }
     }
 
     /// As the library takes them to measure at points.

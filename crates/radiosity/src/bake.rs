@@ -59,7 +59,14 @@ pub struct BakeOptions {
 
 impl Default for BakeOptions {
     fn default() -> Self {
-        BakeOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 1000, rounds: 5, seed: 1, after: After::default() }
+        BakeOptions {
+            error: 0.01,
+            solve: SolveOptions::default(),
+            audit_points: 1000,
+            rounds: 5,
+            seed: 1,
+            after: After::default(),
+        }
     }
 }
 

@@ -101,6 +101,7 @@ impl<'b, 'a> Canvas<'b, 'a> {
     ) -> Result<Drawn, Error> {
         let atlas = self.charts.pack(params)?;
         let (mut all, mut lights, mut plain, mut lit) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        let later = |page: usize| atlas.pages[page + 1..].iter().map(|[width, height]| (width * height) as usize).sum();
         for (page, size) in atlas.pages.iter().enumerate() {
             let texels = atlas.texels(page);
             let known: Vec<Option<Bands>> = match before {
@@ -127,7 +128,7 @@ impl<'b, 'a> Canvas<'b, 'a> {
             }
             for _ in 0..EDGE_ROUNDS {
                 let more = atlas.finer(page, &points, &values, EDGE_CONTRAST, EDGE_POINTS);
-                if more.is_empty() {
+                if more.is_empty() || !judge.has_time_for_edges(more.len(), EDGE_POINTS, later(page), monitor) {
                     break;
                 }
                 // In portions, as they may be many times as many as the texels.

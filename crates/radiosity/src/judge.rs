@@ -17,6 +17,7 @@ use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Places at which written light is compared with the solution, for each place of the audit. At a tenth of the cost of a
 /// lightmap they see edges that take up a thousandth of the area.
@@ -101,6 +102,8 @@ pub(crate) struct Judge<'b, 'a> {
     thinned: f64,
     /// Seconds that a place takes with all rays, where that had to be known.
     each: f64,
+    /// Whether a deadline left something undone.
+    hurried: AtomicBool,
 }
 
 impl<'b, 'a> Judge<'b, 'a> {
@@ -118,6 +121,7 @@ impl<'b, 'a> Judge<'b, 'a> {
             is_relit: false,
             thinned: 1.0,
             each: 0.0,
+            hurried: AtomicBool::new(false),
         }
     }
 
@@ -144,17 +148,34 @@ impl<'b, 'a> Judge<'b, 'a> {
         let left = pace::left(monitor).unwrap_or(0.0) - self.baked.audit_seconds();
         // Fewer rays than points have at least are not sent.
         self.thinned = cost.rays(left / (1.0 + after), [0.0, 1.0]);
+        self.or_hurried(self.thinned >= 1.0);
         Ok(())
     }
 
-    /// Whether points are lit with all their rays.
-    pub fn is_whole(&self) -> bool {
-        self.thinned >= 1.0
+    /// Whether there is time to light so many points once more, with all their rays, and for what comes with it.
+    pub fn has_time(&self, points: f64, after: f64, monitor: &dyn Monitor) -> bool {
+        let seconds = (1.0 + after) * points * self.each + 2.0 * self.baked.audit_seconds();
+        self.or_hurried(self.thinned >= 1.0 && has_time(monitor, seconds))
     }
 
-    /// Seconds that the least audit takes.
-    pub fn audit_seconds(&self) -> f64 {
-        self.baked.audit_seconds()
+    /// Whether a deadline left something undone.
+    pub fn is_hurried(&self) -> bool {
+        self.hurried.load(Ordering::Relaxed)
+    }
+
+    /// Remembers it if there was no time.
+    fn or_hurried(&self, has_time: bool) -> bool {
+        self.hurried.fetch_or(!has_time, Ordering::Relaxed);
+        has_time
+    }
+
+    /// Whether there is time for so many of the points that share a texel, and for `after` texels after them, all with the rays
+    /// that they have. What edges lack is seen less than what texels of further pages would.
+    pub fn has_time_for_edges(&self, points: usize, of: u32, after: usize, monitor: &dyn Monitor) -> bool {
+        // Few rays are not for nothing: a point takes an eighth of what it takes alone, at least.
+        let share = (1.0 / f64::from(of)).max(0.125);
+        let seconds = self.each * (points as f64 * share + after as f64 * self.thinned.max(0.125));
+        self.or_hurried(has_time(monitor, seconds + self.baked.audit_seconds()))
     }
 
     /// Every place at which light will be read back.
@@ -228,8 +249,9 @@ impl<'b, 'a> Judge<'b, 'a> {
         if !self.is_close {
             let plain = |auditor: &Auditor| auditor.judge(&read_back);
             let audit = certify(&mut self.auditor, plain, *error, paths, stages, monitor)?;
-            let takes = self.each * self.more.len() as f64;
-            if audit.upper <= *error || !achieved || !has_time(monitor, takes) {
+            // Places do not pool what they gather.
+            let takes = self.each * (self.pooled * self.more.len()) as f64;
+            if audit.upper <= *error || !achieved || !self.or_hurried(has_time(monitor, takes)) {
                 return Ok(audit);
             }
             // The edges that are left may be so narrow that no place of the audit meets one.

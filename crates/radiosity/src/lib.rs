@@ -50,7 +50,7 @@ pub use error::Error;
 pub use factors::{Doubt, Excess, Factors, FactorsOptions, Missed, factors};
 pub use footprint::least_memory;
 pub use judge::WrittenRound;
-pub use lightmap::{Lightmap, TEXEL_BYTES, lightmap};
+pub use lightmap::{Lightmap, TEXEL_BYTES, lightmap, points_about};
 pub use measure::{MeasureOptions, Measurement, measure};
 pub use monitor::{Monitor, Stages, Timed};
 pub use pace::After;

@@ -5,12 +5,13 @@ use crate::canvas::Canvas;
 use crate::faces::lit_vertex;
 use crate::judge::{Judge, STEP, WrittenRound, is_stalled, root_mean_square};
 use crate::monitor::is_over;
+use crate::pace::EDGES;
 use crate::{Error, Monitor};
 use glam::DVec2;
 use radiosity_io::gltf_out::{Encoding, Light, LitPrimitive, PageImage};
 use radiosity_io::image_out::encode_png;
 use radiosity_scene::display::srgb;
-use radiosity_scene::{Bands, Side};
+use radiosity_scene::{Bands, Mesh, Side};
 use radiosity_view::Audit;
 use radiosity_view::lightmap::{Allotment, Atlas, LightmapError, UnwrapParams};
 use std::collections::HashMap;
@@ -39,6 +40,8 @@ pub struct Lightmap {
     pub needed: Option<f64>,
     /// Root mean square difference across seams, before and after fitting them, lx.
     pub seams: [f64; 2],
+    /// Whether a deadline left something undone.
+    pub hurried: bool,
 }
 
 impl Lightmap {
@@ -92,6 +95,12 @@ pub(crate) fn automatic_texels(charts: usize) -> f64 {
     AUTOMATIC_TEXELS.max(CHART_TEXELS * charts as f64)
 }
 
+/// About how many texels the light of a mesh is written in where no density is asked for; most often, a chart has two triangles or
+/// more.
+pub fn points_about(mesh: &Mesh) -> usize {
+    automatic_texels(mesh.triangles.len() / 2) as usize
+}
+
 /// A vertex of a primitive: its slot, source corners, weights and texture coordinates, the floats by their bits.
 type VertexKey = (usize, [u32; 3], [u32; 3], [u32; 2]);
 
@@ -118,6 +127,7 @@ pub fn lightmap(
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
     let mut judge = Judge::new(baked, POOLED);
+    judge.pace(texels as usize, EDGES, monitor)?;
     let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
     let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
     let mut rounds = vec![drawn.round(&audit)];
@@ -125,7 +135,12 @@ pub fn lightmap(
     // Finer texels while the map misses what the solution has and the texels that are needed can be had.
     let tolerance = baked.error * root_mean_square(&baked.solution);
     let mut needed = None;
-    while texels_per_metre.is_none() && rounds.len() <= ROUNDS && !is_stalled(&rounds) && !is_over(monitor) {
+    while texels_per_metre.is_none()
+        && rounds.len() <= ROUNDS
+        && !is_stalled(&rounds)
+        && !is_over(monitor)
+        && judge.has_time(STEP * texels, EDGES, monitor)
+    {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let detail = canvas.detail(&drawn, tolerance);
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
@@ -139,7 +154,8 @@ pub fn lightmap(
         // As far as a round may go; if not all the way, it is not the last.
         let steps = std::iter::successors(Some(goal.left.max(STEP)), |left| Some(STEP_BACK * left))
             .take_while(|left| *left < 1.0);
-        let Some(step) = steps.filter_map(allot).find(|step| lit(step) <= MOST_LIT * budget) else { break };
+        let is_near = |step: &Allotment| lit(step) <= MOST_LIT * budget && judge.has_time(lit(step), EDGES, monitor);
+        let Some(step) = steps.filter_map(allot).find(is_near) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
         drawn = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;
@@ -157,6 +173,7 @@ pub fn lightmap(
         audit,
         seams: [drawn.seams.before, drawn.seams.after],
         rounds,
+        hurried: judge.is_hurried(),
         pages: drawn.atlas.pages,
         irradiance: drawn.irradiance,
     })

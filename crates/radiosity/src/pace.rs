@@ -184,3 +184,105 @@ impl Monitor for Paced<'_> {
         *self.deadline.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Timed;
+
+    /// A machine whose clock is known: seconds of work on so many items.
+    struct Machine {
+        fixed: f64,
+        each: f64,
+        items: f64,
+    }
+
+    impl Machine {
+        fn seconds(&self, items: f64, rays: f64) -> f64 {
+            items * (self.fixed + self.each * rays)
+        }
+
+        /// As a hundredth of the items tells it.
+        fn timed(&self) -> Cost {
+            let time = |rays: f64| (rays, self.seconds(self.items / 100.0, rays));
+            Cost::new([time(16.0), time(64.0)], 100.0)
+        }
+    }
+
+    /// On machines a thousand times as fast as each other, whatever the time: work ends within it, or is done with the fewest
+    /// rays; more time never gives fewer, and all that is wanted is done where there is time for it.
+    #[test]
+    fn work_keeps_within_the_time_by_its_own_estimate() {
+        for speed in [1e-8, 1e-7, 1e-6, 1e-5] {
+            for fixed in [0.0, 8.0, 30.0] {
+                let machine = Machine { fixed: fixed * speed, each: speed, items: 1e6 };
+                let mut before = 0.0;
+                for k in -10..20 {
+                    let seconds = 2f64.powi(k);
+                    let rays = machine.timed().rays(seconds, [16.0, 256.0]);
+                    assert!((16.0..=256.0).contains(&rays) && rays >= before, "{rays} after {before}");
+                    let takes = machine.seconds(machine.items, rays);
+                    assert!(takes <= seconds || rays == 16.0, "{takes} s of {seconds} with {rays} rays");
+                    let all = machine.seconds(machine.items, 256.0);
+                    assert!(rays == 256.0 || 0.8 * seconds < all, "{rays} rays in {seconds} s");
+                    before = rays;
+                }
+            }
+        }
+    }
+
+    /// Two short times of which the longer work took less say nothing of the rays: they are not taken to be free.
+    #[test]
+    fn rays_are_never_free() {
+        let cost = Cost::new([(16.0, 0.03), (64.0, 0.02)], 100.0);
+        assert!(cost.rays(10.0, [16.0, 1e6]) < 1000.0, "{cost:?}");
+        assert!((cost.seconds(64.0) - 2.0).abs() < 1e-9, "{cost:?}");
+    }
+
+    /// Passes leap to the rays that are wanted, no further than there is time, and never beyond the deadline by their own estimate.
+    #[test]
+    fn passes_leap_as_far_as_there_is_time() {
+        assert_eq!(leap(64, 1024.0, 1e9, 1e-3), Some(1024));
+        assert_eq!(leap(64, 1000.0, 1e9, 1e-3), Some(1024));
+        assert_eq!(leap(64, 1.0, 1e9, 1e-3), Some(64));
+        assert_eq!(leap(64, 1024.0, 0.05, 1e-3), None);
+        for k in 0..16 {
+            let seconds = 0.1 * 1.5f64.powi(k);
+            if let Some(rays) = leap(64, 1024.0, seconds, 1e-3) {
+                assert!(1e-3 * rays as f64 <= seconds && (rays == 1024 || 2.4e-3 * rays as f64 > seconds), "{seconds}");
+            }
+        }
+    }
+
+    /// Refinement leaves time for what follows, as much as it takes or more than half; without a deadline there is none to leave.
+    #[test]
+    fn time_is_kept_for_what_follows_and_none_without_a_deadline() {
+        assert_eq!((kept(10.0, 0.0), kept(10.0, f64::INFINITY)), (0.0, 6.0));
+        assert!(kept(10.0, 2.0) > 2.0 && kept(10.0, 2.0) < 2.5);
+        let after = After { pixels: 1000, points: 1000 };
+        let free = Paced::new(&(), &after);
+        free.keep(1.0);
+        assert!(free.deadline().is_none() && left(&free).is_none());
+        let timed = Timed::new(&(), Duration::from_secs(1000));
+        let paced = Paced::new(&timed, &after);
+        let before = |paced: &Paced| timed.deadline().zip(paced.deadline()).map(|(end, own)| (end - own).as_secs_f64());
+        assert!(before(&paced).is_some_and(|kept| kept > 590.0 && kept <= 600.0));
+        paced.keep(85.0);
+        assert!(before(&paced).is_some_and(|kept| (kept - 100.0).abs() < 0.1));
+        assert_eq!(Paced::new(&timed, &After::default()).deadline(), timed.deadline());
+    }
+
+    /// Parts that are timed are spread over all items, and few beside them.
+    #[test]
+    fn samples_are_small_and_even() {
+        for n in [1, 10, 100, 3000, 100_000, 1_000_000] {
+            let items: Vec<usize> = (0..n).collect();
+            let (some, parts) = sample(&items);
+            assert!(!some.is_empty() && (parts * some.len() as f64 - n as f64).abs() < 1e-6 * n as f64);
+            assert!(some.len() <= RUN + n / 8 && some.len() <= 2 * SAMPLE, "{} of {n}", some.len());
+            let mean = some.iter().sum::<usize>() as f64 / some.len() as f64;
+            assert!(n < 100_000 || (mean / n as f64 - 0.5).abs() < 0.05, "{mean} of {n}");
+        }
+        assert!(sample::<u32>(&[]).0.is_empty());
+    }
+}
