@@ -45,7 +45,8 @@ const LEAST_RAYS: u32 = 8;
 /// share with, and half as many rays would leave theirs as different as checks are.
 const LEAST_POOLED: usize = 64;
 
-/// Parts of their rays that some points are lit with to see how long that takes.
+/// Parts of their rays that some points are lit with to see how long that takes. With less than the first, points of small things,
+/// which pool with few, would be more unlike each other than what is around them.
 const TIMED: [f64; 2] = [0.125, 0.5];
 
 /// One attempt at writing light so that it is read back as well as was asked.
@@ -125,14 +126,15 @@ impl<'b, 'a> Judge<'b, 'a> {
         }
     }
 
-    /// Where there is a deadline, finds with which part of their rays so many points are lit by it; `after` for that is kept for what is
-    /// done then, relative to it. Places where light is read back are timed: they are spread as points are.
+    /// Where there is a deadline, finds with which part of their rays so many points are lit by it, and which part of them there is
+    /// time for where that is the least; time is kept for what comes `after`, relative to it. Places where light is read back are
+    /// timed: they are spread as points are.
     ///
     /// # Errors
     /// [`Error::Stopped`].
-    pub fn pace(&mut self, points: usize, after: f64, monitor: &dyn Monitor) -> Result<(), Error> {
+    pub fn pace(&mut self, points: f64, after: f64, monitor: &dyn Monitor) -> Result<f64, Error> {
         if pace::left(monitor).is_none() || self.more.is_empty() {
-            return Ok(());
+            return Ok(1.0);
         }
         let (some, parts) = pace::sample(&self.more);
         let mut times = [(0.0, 0.0); 2];
@@ -142,14 +144,12 @@ impl<'b, 'a> Judge<'b, 'a> {
             lit?;
             *time = (thinned, seconds);
         }
-        let points_for_each = points as f64 / self.more.len() as f64;
-        let cost = Cost::new(times, parts * points_for_each);
-        self.each = cost.seconds(1.0) / points.max(1) as f64;
-        let left = pace::left(monitor).unwrap_or(0.0) - self.baked.audit_seconds();
-        // Fewer rays than points have at least are not sent.
-        self.thinned = cost.rays(left / (1.0 + after), [0.0, 1.0]);
+        let cost = Cost::new(times, parts * points / self.more.len() as f64);
+        self.each = cost.seconds(1.0) / points.max(1.0);
+        let left = (pace::left(monitor).unwrap_or(0.0) - self.baked.audit_seconds()).max(0.0) / (1.0 + after);
+        self.thinned = cost.rays(left, [TIMED[0], 1.0]);
         self.or_hurried(self.thinned >= 1.0);
-        Ok(())
+        Ok(cost.part(left, self.thinned))
     }
 
     /// Whether there is time to light so many points once more, with all their rays, and for what comes with it.

@@ -72,6 +72,9 @@ pub const TEXEL_BYTES: usize = 400;
 const AUTOMATIC_TEXELS: f64 = 200_000.0;
 const CHART_TEXELS: f64 = 4.0;
 
+/// Part of these that there are however little time there is: texels twice as wide. Wider ones lose the shadows of furniture's legs.
+const LEAST_TEXELS: f64 = 0.25;
+
 /// How many times as many texels are spent for an error at most: more than a page of 2048 × 2048 is no lightmap for a room any
 /// more.
 const MOST_GROWTH: f64 = 20.0;
@@ -120,14 +123,19 @@ pub fn lightmap(
     let mut canvas = Canvas::new(&baked.solution, &params)?;
     let most = (baked.solution.memory_allowed() / TEXEL_BYTES) as f64;
     let budget = automatic_texels(canvas.charts.len()).min(most);
-    params.texels_per_metre =
-        texels_per_metre.or_else(|| canvas.charts.density_for(budget)).unwrap_or(params.texels_per_metre);
+    let mut judge = Judge::new(baked, POOLED);
+    // Where there is no time for that many with the fewest rays, there are fewer.
+    let part = if texels_per_metre.is_none() { judge.pace(budget, EDGES, monitor)? } else { 1.0 };
+    params.texels_per_metre = texels_per_metre
+        .or_else(|| canvas.charts.density_for(budget * part.max(LEAST_TEXELS)))
+        .unwrap_or(params.texels_per_metre);
     let texels = canvas.charts.texel_count(params.texels_per_metre);
     if texels > most {
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
-    let mut judge = Judge::new(baked, POOLED);
-    judge.pace(texels as usize, EDGES, monitor)?;
+    if texels_per_metre.is_some() {
+        judge.pace(texels, EDGES, monitor)?;
+    }
     let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
     let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
     let mut rounds = vec![drawn.round(&audit)];

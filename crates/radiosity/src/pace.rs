@@ -53,6 +53,13 @@ impl Cost {
     }
 }
 
+impl Cost {
+    /// The part of the work with so many rays that seconds suffice for, with some left over.
+    pub fn part(&self, seconds: f64, rays: f64) -> f64 {
+        (SURE * seconds / self.seconds(rays).max(f64::MIN_POSITIVE)).min(1.0)
+    }
+}
+
 /// Whether so many seconds are sure to do for what is expected to take `needed`.
 pub(crate) fn suffices(seconds: f64, needed: f64) -> bool {
     needed <= SURE * seconds
@@ -223,6 +230,9 @@ mod tests {
                     assert!((16.0..=256.0).contains(&rays) && rays >= before, "{rays} after {before}");
                     let takes = machine.seconds(machine.items, rays);
                     assert!(takes <= seconds || rays == 16.0, "{takes} s of {seconds} with {rays} rays");
+                    let part = machine.timed().part(seconds, rays);
+                    assert!(part <= 1.0 && part * takes <= seconds, "{part} of {takes} s in {seconds}");
+                    assert!(rays == 16.0 || part == 1.0, "{part} with {rays} rays");
                     let all = machine.seconds(machine.items, 256.0);
                     assert!(rays == 256.0 || 0.8 * seconds < all, "{rays} rays in {seconds} s");
                     before = rays;

@@ -1,15 +1,16 @@
 //! A picture of a solution: direct light evaluated for each pixel, indirect light from the continuous field.
 
-use crate::answer::Station;
+use crate::answer::{Station, read};
 use crate::measure::{certify, most_paths};
 use crate::monitor::{Monitor, Timed};
 use crate::pace::{self, Cost};
 use crate::{Baked, Error, Indirect, Solution};
-use radiosity_scene::{Bands, Camera, luminance};
+use radiosity_scene::{Bands, Camera, Side, luminance};
 use radiosity_trace::Place;
 use radiosity_trace::sampling::{hash, unit};
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor, Picture, ViewRays};
+use std::collections::HashMap;
 use std::time::Duration;
 
 /// How to make a picture.
@@ -32,6 +33,10 @@ impl Default for RenderOptions {
 /// Shadow rays of a pixel, however little time there is: with 8 penumbrae have steps that one sees from afar, and 16 take little more,
 /// as much of what a pixel takes is taken by none.
 const LEAST_SHADOW_RAYS: u32 = 16;
+
+/// Pixels along a side of the squares whose pixels share their direct light where the fewest rays are too many still: most of what a
+/// pixel takes goes to finding what its lights would give. Wider ones make stairs of shadows' edges that one sees.
+const SQUARE: u32 = 2;
 
 /// Shadow rays that a part of the pixels is timed with: enough to tell what each takes.
 const TIMED_SHADOW_RAYS: u32 = 64;
@@ -90,8 +95,8 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     }
     let mut shadowing = options.shadowing;
     let light = baked.received.clone();
-    let field = match pace::left(monitor) {
-        None => solution.field_on(&looks, light, baked.error, monitor)?,
+    let (field, enough) = match pace::left(monitor) {
+        None => (solution.field_on(&looks, light, baked.error, monitor)?, true),
         Some(_) => {
             let after = SEEN * baked.audit_seconds() + ENCODED * cast;
             let asked = f64::from(options.shadowing.rays);
@@ -104,10 +109,17 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
             let least = f64::from(LEAST_SHADOW_RAYS.min(options.shadowing.rays));
             let cost = cost(solution, &stations, &options.shadowing, monitor)?;
             shadowing.rays = cost.rays(left(), [least, asked]) as u32;
-            field
+            (field, cost.part(left(), least) >= 1.0)
         }
     };
-    let answer = solution.at(&stations, Indirect::Field(&field), &shadowing, monitor)?;
+    let answer = if enough {
+        solution.at(&stations, Indirect::Field(&field), &shadowing, monitor)?
+    } else {
+        let (own, of) = squares(&view, SQUARE);
+        let places: Vec<Place> = own.iter().map(|&i| stations[i].place).collect();
+        let lit = solution.direct_at(&places, &shadowing, monitor)?;
+        read(&stations, of.into_iter().map(|k| lit[k]).collect(), &field)
+    };
     let pixels = view.own.len();
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
     for (seen, e) in view.seen.iter().zip(&answer.irradiance) {
@@ -124,6 +136,23 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     };
     let watched = (0..count).map(pick).map(|i| (stations[i].place, answer.irradiance[i])).collect();
     Ok(View { picture: view.picture(&answer.irradiance), illuminance, watched, shadow_rays: shadowing.rays })
+}
+
+/// One of all that is seen of a triangle's side in each square of so many pixels, and for each that is seen which of them stands for
+/// it.
+fn squares(view: &ViewRays, side: u32) -> (Vec<usize>, Vec<usize>) {
+    let (mut own, mut of) = (Vec::new(), Vec::with_capacity(view.seen.len()));
+    let mut known: HashMap<(u32, u32, Side, bool), usize> = HashMap::new();
+    for (i, seen) in view.seen.iter().enumerate() {
+        let (row, column) = (seen.pixel / view.width / side, seen.pixel % view.width / side);
+        let square = row * view.width + column;
+        let stands = *known.entry((square, seen.place.triangle, seen.side, seen.behind)).or_insert(own.len());
+        if stands == own.len() {
+            own.push(i);
+        }
+        of.push(stands);
+    }
+    (own, of)
 }
 
 /// What direct light of all pixels takes by its shadow rays.
