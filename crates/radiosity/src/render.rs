@@ -34,6 +34,14 @@ impl Default for RenderOptions {
 /// as much of what a pixel takes is taken by none.
 const LEAST_SHADOW_RAYS: u32 = 16;
 
+/// Part of the time left that the camera's rays may take; where it is more, each side of a pixel has so many samples instead of four:
+/// edges are still softened.
+const CAST: f64 = 0.15;
+const FEWEST_SAMPLES: u32 = 2;
+
+/// By how much smaller along each side a picture is that tells how long its rays take.
+const SMALLER: u32 = 16;
+
 /// Pixels along a side of the squares whose pixels share their direct light where the fewest rays are too many still: most of what a
 /// pixel takes goes to finding what its lights would give. Wider ones make stairs of shadows' edges that one sees.
 const SQUARE: u32 = 2;
@@ -84,7 +92,7 @@ impl View {
 pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: &dyn Monitor) -> Result<View, Error> {
     monitor.stage("picture");
     let solution = &baked.solution;
-    let (cast, view) = pace::timed(|| ViewRays::new(solution.tracer(), camera, options.width, options.height));
+    let (cast, view) = pace::timed(|| cast(solution, camera, options, monitor));
     let stations: Vec<Station> =
         view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
     let mut looks = vec![0; solution.elements.cells()];
@@ -136,6 +144,20 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     };
     let watched = (0..count).map(pick).map(|i| (stations[i].place, answer.irradiance[i])).collect();
     Ok(View { picture: view.picture(&answer.irradiance), illuminance, watched, shadow_rays: shadowing.rays })
+}
+
+/// Casts the camera's rays, fewer of them where a small picture tells that they would take too much of the time.
+fn cast(solution: &Solution, camera: &Camera, options: &RenderOptions, monitor: &dyn Monitor) -> ViewRays {
+    let (tracer, RenderOptions { width, height, .. }) = (solution.tracer(), *options);
+    if let Some(left) = pace::left(monitor) {
+        let small = [width, height].map(|side| side.div_ceil(SMALLER));
+        let (seconds, _) = pace::timed(|| ViewRays::new(tracer, camera, small[0], small[1]));
+        let larger = f64::from(width) * f64::from(height) / (f64::from(small[0]) * f64::from(small[1]));
+        if seconds * larger > CAST * left {
+            return ViewRays::sampled(tracer, camera, (width, height), FEWEST_SAMPLES);
+        }
+    }
+    ViewRays::new(tracer, camera, width, height)
 }
 
 /// One of all that is seen of a triangle's side in each square of so many pixels, and for each that is seen which of them stands for
