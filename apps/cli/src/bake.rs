@@ -11,8 +11,9 @@ use crate::{Failure, Global, faults, numbers};
 use clap::{Args, ValueEnum};
 use radiosity::io::gltf_out::{Encoding, Style, lit_glb};
 use radiosity::io::image_out::encode_exr;
-use radiosity::{Camera, Monitor, RenderOptions, Tracer, View, counted};
+use radiosity::{After, Camera, Monitor, RenderOptions, Timed, Tracer, View, counted};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Arguments of `bake`.
 #[derive(Args, Clone, Debug)]
@@ -61,6 +62,9 @@ enum TexelEncoding {
 
 /// By how much smaller a picture is that nobody sees.
 const METERED: u32 = 4;
+
+/// Part of the time that is left for a picture where light is written after it.
+const PICTURED: f64 = 0.4;
 
 /// Pages that a lightmap hardly gets to: of 4096 × 4096 texels each.
 const PAGES: usize = 1000;
@@ -118,19 +122,32 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     progress.limit(arguments.solve.time);
     let frames = Frames::begin(&arguments.picture, (&tracer, camera.as_ref()), &arguments.solve.options(), progress)?;
     let monitor: &dyn Monitor = frames.as_ref().map_or(progress, |frames| frames);
-    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), monitor)?;
+    let size = |camera: &Camera| {
+        let size = views::picture_size(camera, arguments.picture.size);
+        // To meter the light a small picture is enough.
+        if is_shown { size } else { (size.0.div_ceil(METERED), size.1.div_ceil(METERED)) }
+    };
+    let seen = camera.as_ref().filter(|_| wants_view);
+    let pixels = seen.map(&size).map_or(0, |(width, height)| width as usize * height as usize);
+    let after = After { pixels, points: radiosity::points_about(&input.mesh) };
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture, after), monitor)?;
     frames.map_or(Ok(()), Frames::end)?;
 
     // Pictures first: their exposure serves the unlit model as well.
     progress.part("pictures");
     let look = |camera: &Camera| {
-        let size = views::picture_size(camera, arguments.picture.size);
-        // To meter the light a small picture is enough.
-        let (width, height) = if is_shown { size } else { (size.0.div_ceil(METERED), size.1.div_ceil(METERED)) };
+        let (width, height) = size(camera);
         let options = RenderOptions { width, height, ..RenderOptions::default() };
-        radiosity::render(&baked, camera, &options, progress)
+        // Light that is written comes after it.
+        match progress.deadline() {
+            None => radiosity::render(&baked, camera, &options, progress),
+            Some(deadline) => {
+                let left = deadline.saturating_duration_since(Instant::now());
+                radiosity::render(&baked, camera, &options, &Timed::new(progress, left.mul_f64(PICTURED)))
+            }
+        }
     };
-    let view = camera.as_ref().filter(|_| wants_view).map(look).transpose()?;
+    let view = seen.map(look).transpose()?;
     let exposure = arguments.picture.exposure.or(view.as_ref().map(|v| v.picture.exposure())).unwrap_or(0.0);
     let mut written: Vec<&Path> = Vec::new();
     if let (Some(path), Some(view)) = (&arguments.image, &view) {
@@ -140,14 +157,19 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
 
     let (mut pages, mut lightmap) = (Vec::new(), None);
-    let (model, audit, rounds) = if arguments.vertices || arguments.unlit {
+    let (model, audit, rounds, is_hurried) = if arguments.vertices || arguments.unlit {
         progress.part("vertex light");
         let light = radiosity::vertex_light(&baked, progress)?;
         let style = match arguments.vertices {
             true => Style::Vertices,
             false => Style::Unlit { exposure: exposure.exp2() as f32 },
         };
-        (lit_glb(&input.scene, input.document.as_ref(), &light.primitives, &style), light.audit, light.rounds)
+        (
+            lit_glb(&input.scene, input.document.as_ref(), &light.primitives, &style),
+            light.audit,
+            light.rounds,
+            light.hurried,
+        )
     } else {
         progress.part("lightmap");
         let map = radiosity::lightmap(&baked, arguments.texels_per_metre, arguments.max_atlas, progress)?;
@@ -166,7 +188,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             pages.push(beside);
         }
         let style = Style::Lightmap { pages: map.images(encoding)?, encoding, exposure: 1.0 };
-        (lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style), map.audit, map.rounds)
+        (lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style), map.audit, map.rounds, map.hurried)
     };
     progress.part("writing");
     outputs.stage(&target, &model.map_err(|error| Failure::work(format!("{}: {error}", target.display())))?)?;
@@ -178,7 +200,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             "warning: no light of the sky reaches any surface; the model has no opening, or faces look the wrong way",
         );
     }
-    let written = (&audit, rounds, lightmap);
+    let written = (&audit, rounds, lightmap, is_hurried);
     let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref(), exposure), written, &files, progress);
     for path in &arguments.report {
         let text = match is_json(path) {

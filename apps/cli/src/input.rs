@@ -89,8 +89,9 @@ pub struct SolveArguments {
     /// noticed), instead of to a residual of 1e-4. It tells of the solver alone; --error of all the rest too.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = numbers::delta_e)]
     pub delta_e: Option<f64>,
-    /// When the answer so far will do, such as 30s or 5min since the start: refinement ends then, and what it has is written
-    /// with its error, which takes some more. The answer depends on the machine then. [also: --budget]
+    /// When the answer is to be there, such as 30s or 5min since the start: refinement leaves time for pictures, texels and audits, which
+    /// have as many rays as there is time for, and the error tells what came of it. Only the least takes longer: a first solution, and
+    /// one pass of few rays. The answer depends on the machine then. [also: --budget]
     #[arg(long, alias = "budget", value_name = "TIME", allow_hyphen_values = true, value_parser = numbers::seconds)]
     pub time: Option<f64>,
     /// Most rounds of refinement.
@@ -181,13 +182,13 @@ impl SolveArguments {
     }
 
     /// As the library takes them to light surfaces; what is displayed is judged at the exposure of the picture, if it is given.
-    pub fn bake(&self, picture: &PictureArguments) -> radiosity::BakeOptions {
+    pub fn bake(&self, picture: &PictureArguments, after: radiosity::After) -> radiosity::BakeOptions {
         let default = radiosity::BakeOptions::default();
         let mut solve = self.options();
         if let Some(displayed) = &mut solve.displayed {
             displayed.exposure = picture.exposure;
         }
-        radiosity::BakeOptions { error: self.error, solve, rounds: self.rounds, seed: self.seed, ..default }
+        radiosity::BakeOptions { error: self.error, solve, rounds: self.rounds, seed: self.seed, after, ..default }
     }
 
     /// As the library takes them to measure at points.

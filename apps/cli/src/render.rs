@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use crate::report::ErrorReport;
 use crate::{Failure, Global, views};
 use clap::Args;
-use radiosity::{Monitor, RenderOptions, Tracer};
+use radiosity::{After, Monitor, RenderOptions, Tracer};
 use std::path::PathBuf;
 
 /// Arguments of `render`.
@@ -43,10 +43,11 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     progress.limit(arguments.solve.time);
     let frames = Frames::begin(&arguments.picture, (&tracer, Some(&camera)), &arguments.solve.options(), progress)?;
     let monitor: &dyn Monitor = frames.as_ref().map_or(progress, |frames| frames);
-    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture), monitor)?;
+    let (width, height) = views::picture_size(&camera, arguments.picture.size);
+    let after = After { pixels: width as usize * height as usize, points: 0 };
+    let baked = radiosity::bake(&tracer, &arguments.solve.bake(&arguments.picture, after), monitor)?;
     frames.map_or(Ok(()), Frames::end)?;
     progress.part("picture");
-    let (width, height) = views::picture_size(&camera, arguments.picture.size);
     let render = RenderOptions { width, height, ..RenderOptions::default() };
     let view = radiosity::render(&baked, &camera, &render, progress)?;
     let audit = view.audit(&baked, progress)?;
@@ -56,7 +57,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
     outputs.commit()?;
 
-    let is_over = baked.out_of_time || progress.is_over();
+    let is_over = baked.out_of_time || view.shadow_rays < render.shadowing.rays || progress.is_over();
     let error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
     let shown = baked.solution.displayed(Some(exposure));
     if global.json {

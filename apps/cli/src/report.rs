@@ -261,7 +261,7 @@ impl Report {
         input: &input::Input,
         solve: &input::SolveArguments,
         (baked, view, exposure): (&Baked, Option<&View>, f64),
-        (written, written_rounds, lightmap): (&Audit, Vec<WrittenRound>, Option<LightmapReport>),
+        (written, written_rounds, lightmap, is_hurried): (&Audit, Vec<WrittenRound>, Option<LightmapReport>, bool),
         outputs: &[&Path],
         progress: &Progress,
     ) -> Report {
@@ -311,7 +311,11 @@ impl Report {
             },
             error: ErrorReport {
                 finer,
-                ..ErrorReport::new((written, &baked.audit), solve, baked.out_of_time || progress.is_over())
+                ..ErrorReport::new(
+                    (written, &baked.audit),
+                    solve,
+                    baked.out_of_time || is_hurried || progress.is_over(),
+                )
             },
             illuminance,
             rounds: baked.rounds.clone(),

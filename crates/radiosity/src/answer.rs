@@ -44,6 +44,19 @@ pub struct Answer {
     pub standard_error: Vec<Bands>,
 }
 
+/// Irradiance at stations whose direct light is known, by the field of indirect light.
+pub(crate) fn read(stations: &[Station], direct: Vec<Bands>, field: &Field) -> Answer {
+    let irradiance = stations
+        .par_iter()
+        .zip(&direct)
+        .map(|(s, d)| {
+            let h = field.at(s.place.triangle as usize, s.uv, s.side);
+            std::array::from_fn(|band| d[band] + h[band])
+        })
+        .collect();
+    Answer { irradiance, direct, standard_error: vec![[0.0; 3]; stations.len()] }
+}
+
 impl Solution<'_> {
     /// Irradiance at stations, direct light with the given shadow rays.
     ///
@@ -59,18 +72,7 @@ impl Solution<'_> {
         let places: Vec<Place> = stations.iter().map(|s| s.place).collect();
         match indirect {
             Indirect::Gather { rays } => self.gathered(&places, rays, shadowing, monitor),
-            Indirect::Field(field) => {
-                let direct = self.direct_at(&places, shadowing, monitor)?;
-                let irradiance = stations
-                    .par_iter()
-                    .zip(&direct)
-                    .map(|(s, d)| {
-                        let h = field.at(s.place.triangle as usize, s.uv, s.side);
-                        std::array::from_fn(|band| d[band] + h[band])
-                    })
-                    .collect();
-                Ok(Answer { irradiance, direct, standard_error: vec![[0.0; 3]; stations.len()] })
-            }
+            Indirect::Field(field) => Ok(read(stations, self.direct_at(&places, shadowing, monitor)?, field)),
         }
     }
 

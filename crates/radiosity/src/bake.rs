@@ -2,8 +2,9 @@
 
 use crate::answer::Station;
 use crate::lightmap::automatic_texels;
-use crate::measure::{ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
+use crate::measure::{FIRST_PATHS, ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages, has_time, is_over};
+use crate::pace::{self, After, Paced};
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
 use radiosity_scene::Bands;
 use radiosity_trace::Tracer;
@@ -52,11 +53,20 @@ pub struct BakeOptions {
     pub rounds: usize,
     /// Seed of the audit.
     pub seed: u64,
+    /// What is going to be made of the solution: a deadline leaves time for it.
+    pub after: After,
 }
 
 impl Default for BakeOptions {
     fn default() -> Self {
-        BakeOptions { error: 0.01, solve: SolveOptions::default(), audit_points: 1000, rounds: 5, seed: 1 }
+        BakeOptions {
+            error: 0.01,
+            solve: SolveOptions::default(),
+            audit_points: 1000,
+            rounds: 5,
+            seed: 1,
+            after: After::default(),
+        }
     }
 }
 
@@ -91,6 +101,18 @@ pub struct Baked<'a> {
     pub(crate) light: Vec<Bands>,
 }
 
+impl Baked<'_> {
+    /// Seconds that the least audit takes.
+    pub(crate) fn audit_seconds(&self) -> f64 {
+        seconds_of_audit(&self.stages, &self.auditor)
+    }
+}
+
+/// Seconds that the least audit takes, by all that an auditor has traced, and others since.
+fn seconds_of_audit(stages: &Stages, auditor: &Auditor) -> f64 {
+    stages.of("audit") * f64::from(FIRST_PATHS) / f64::from(auditor.paths().max(FIRST_PATHS))
+}
+
 /// Light at the places of the audit, and the rays that it was read with.
 struct Reading {
     gather: usize,
@@ -122,6 +144,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let start = Instant::now();
     let mut begun = start;
     let stages = Stages::default();
+    let paced = Paced::new(monitor, &options.after);
+    let monitor: &dyn Monitor = &paced;
     let solve = suited(tracer, options);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
     monitor.round(1, options.rounds + 1);
@@ -139,24 +163,40 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let mut read = |gather: usize| {
             let indirect = if gather == 0 { Indirect::Field(&field) } else { Indirect::Gather { rays: gather } };
             let shadowing = Shadowing { rays: shadowing.rays.max(SHADOW_RAYS * gather as u32), ..shadowing };
+            let before = ["direct light", "gather"].map(|name| solution.stages.of(name));
             let light = solution.at(&watched, indirect, &shadowing, monitor)?.irradiance;
+            let [direct, gathered] = ["direct light", "gather"].map(|name| solution.stages.of(name));
             let judge = |auditor: &Auditor| auditor.judge(&light);
             let audit = certify(&mut auditor, judge, options.error, most_paths, &stages, monitor)?;
+            // What is made of the solution takes about as long at each place.
+            let each = |seconds: f64, rays: f64| seconds / (rays * watched.len().max(1) as f64).max(1.0);
+            let takes = pace::Reading {
+                shadow_ray: each(direct - before[0], f64::from(shadowing.rays)),
+                gather_ray: each(gathered - before[1], gather as f64),
+                audit: seconds_of_audit(&stages, &auditor),
+            };
+            // Points that are written have as many rays by the error asked.
+            let written = gather_rays(options.error);
+            let shadow_rays = shadowing.rays.min(2 * written as u32);
+            paced.keep(options.after.full(&takes, f64::from(shadow_rays), gather.min(written) as f64));
             Ok::<_, Error>((audit, Reading { gather, shadowing, light }))
         };
         // The field does not know contacts below the size of its elements: gathering at each point does, and costs less
         // than elements that small.
         let mut rays = gather_rays(options.error);
         let first = if solve.looked_up { rays } else { 0 };
-        let (mut audit, mut reading) = read(first)?;
+        let (mut seconds, first_read) = pace::timed(|| read(first));
+        let (mut audit, mut reading) = first_read?;
         rays = rays.max(2 * first);
         let affordable = SOLUTIONS * solution.rays_in_all() / automatic_texels(tracer.mesh.triangles.len() / 2);
         for doublings in 0.. {
             let is_dear = doublings >= GATHERS && rays as f64 > affordable;
-            if is_dear || audit.upper <= options.error || is_over(monitor) {
+            if is_dear || audit.upper <= options.error || !has_time(monitor, ROUND_GROWTH * seconds) {
                 break;
             }
-            let better = read(rays)?;
+            let (took, better) = pace::timed(|| read(rays));
+            seconds = took;
+            let better = better?;
             if better.0.upper >= audit.upper {
                 break;
             }

@@ -102,6 +102,7 @@ impl<'b, 'a> Canvas<'b, 'a> {
     ) -> Result<Drawn, Error> {
         let atlas = self.charts.pack(params)?;
         let (mut all, mut lights, mut plain, mut lit) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        let later = |page: usize| atlas.pages[page + 1..].iter().map(|[width, height]| (width * height) as usize).sum();
         for (page, size) in atlas.pages.iter().enumerate() {
             let texels = atlas.texels(page);
             let known: Vec<Option<Bands>> = match before {
@@ -128,7 +129,7 @@ impl<'b, 'a> Canvas<'b, 'a> {
             }
             for _ in 0..EDGE_ROUNDS {
                 let more = atlas.finer(page, &points, &values, EDGE_CONTRAST, EDGE_POINTS);
-                if more.is_empty() {
+                if more.is_empty() || !judge.has_time_for_edges(more.len(), EDGE_POINTS, later(page), monitor) {
                     break;
                 }
                 // In portions, as they may be many times as many as the texels.
@@ -185,7 +186,8 @@ impl<'b, 'a> Canvas<'b, 'a> {
         let shown: Vec<usize> =
             (0..texels.len()).into_par_iter().filter(|&i| !is_hidden(self.solution, &at[i])).collect();
         let (own, at): (Vec<Texel>, Vec<Station>) = shown.iter().map(|&i| (texels[i], at[i])).unzip();
-        let found = texels::light(judge.baked(), Sheet { atlas, page, texels: &own }, &at, judge.gathers(), monitor)?;
+        let sheet = Sheet { atlas, page, texels: &own };
+        let found = texels::light(judge.baked(), sheet, &at, (judge.gathers(), judge.thinned()), monitor)?;
         let (mut light, mut smooth) = (vec![[f32::NAN; 3]; texels.len()], vec![None; texels.len()]);
         for (&i, (d, p)) in shown.iter().zip(found.direct.iter().zip(&found.indirect)) {
             light[i] = std::array::from_fn(|k| d[k] + p.light[k]);

@@ -3,6 +3,7 @@
 
 use crate::measure::brought_nothing;
 use crate::monitor::{Monitor, Watch, is_over};
+use crate::pace;
 use crate::{Error, Solution};
 use glam::DVec3;
 use radiosity_scene::{Bands, luminance};
@@ -21,6 +22,10 @@ const FEWEST_RAYS: usize = 8;
 
 /// Rays that gather for a cell that is looked at are doubled up to this: half a minute for 15,000 cells.
 const MOST_RAYS: usize = 4096;
+
+/// Rays that each cell that is looked at gathers with, however little time there is: elements that are looked up alone may have sixteen
+/// for a cell, and are mottled then. They take a twentieth of the time of what is done without a limit.
+const LEAST_SEEN: usize = 64;
 
 /// Noise that is seen on a smooth wall, relative to its light: pictures have no more, whatever error is asked for.
 const VISIBLE: f64 = 0.01;
@@ -49,7 +54,16 @@ impl Solution<'_> {
             })
             .collect();
         let mut light = self.indirect_halves();
-        self.gather_on(&curved, self.rays(), &mut light, monitor)?;
+        let mut rays = self.rays();
+        if let Some(left) = pace::left(monitor)
+            && rays > LEAST_SEEN
+            && !curved.is_empty()
+        {
+            let each = self.seconds_to_gather(&curved, LEAST_SEEN, &light, monitor)?;
+            // Half of the time at most: an audit follows.
+            rays = pace::leap(LEAST_SEEN, rays as f64, 0.5 * left, each).unwrap_or(LEAST_SEEN).min(rays);
+        }
+        self.gather_on(&curved, rays, &mut light, monitor)?;
         Ok(light)
     }
 
@@ -75,16 +89,51 @@ impl Solution<'_> {
         let noise = |light: &[[Bands; 2]]| self.noise(light, |cell, _| f64::from(looks[cell]));
         let mut noises = vec![noise(&light)];
         let mut rays = 2 * self.rays();
+        // Within a time limit, seconds for each ray.
+        let mut each = match pace::left(monitor) {
+            Some(_) => Some(self.seconds_to_gather(&seen, rays.min(LEAST_SEEN), &light, monitor)?),
+            None => None,
+        };
+        if each.is_some() && is_over(monitor) && rays <= LEAST_SEEN {
+            self.gather_on(&seen, LEAST_SEEN, &mut light, monitor)?;
+        }
         while noises.last().is_some_and(|last| *last > error.min(VISIBLE))
             && rays <= MOST_RAYS
             && !brought_nothing(&noises)
             && !is_over(monitor)
         {
-            self.gather_on(&seen, rays, &mut light, monitor)?;
+            if let (Some(each), Some(left), [.., last]) = (each, pace::left(monitor), noises.as_slice()) {
+                // Noise falls with the root of the rays at least: no more of them are wanted at once than would do then.
+                let wanted = 0.5 * rays as f64 * (last / error.min(VISIBLE)).powi(2);
+                let next = pace::leap(rays, wanted.min(MOST_RAYS as f64), left, each);
+                // The least is gathered in any case, once.
+                match next.or((noises.len() == 1 && rays <= LEAST_SEEN).then_some(LEAST_SEEN)) {
+                    Some(next) => rays = next,
+                    None => break,
+                }
+            }
+            let (took, gathered) = pace::timed(|| self.gather_on(&seen, rays, &mut light, monitor));
+            gathered?;
+            each = each.map(|_| took / rays as f64);
             noises.push(noise(&light));
             rays *= 2;
         }
         Ok(self.field_of(&light))
+    }
+
+    /// Seconds that elements take to gather for each ray, by a part of them that gathers with so many; nothing is kept.
+    fn seconds_to_gather(
+        &self,
+        elements: &[Shaded],
+        rays: usize,
+        light: &[[Bands; 2]],
+        monitor: &dyn Monitor,
+    ) -> Result<f64, Error> {
+        let (some, parts) = pace::sample(elements);
+        let mut thrown_away = light.to_vec();
+        let (seconds, gathered) = pace::timed(|| self.gather_on(&some, rays, &mut thrown_away, monitor));
+        gathered?;
+        Ok(parts * seconds / rays as f64)
     }
 
     /// The field of light by element, in halves.

@@ -8,6 +8,8 @@
 use crate::answer::{Answer, Station};
 use crate::bake::{Baked, GATHERS, gather_rays};
 use crate::measure::{brought_nothing, certify, most_paths};
+use crate::monitor::has_time;
+use crate::pace::{self, Cost};
 use crate::{Error, Indirect, Monitor, Solution, stations};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
@@ -15,6 +17,7 @@ use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Places at which written light is compared with the solution, for each place of the audit. At a tenth of the cost of a
 /// lightmap they see edges that take up a thousandth of the area.
@@ -50,6 +53,10 @@ pub(crate) enum Written {
     /// Texels have rays by the error asked and their noise ([`crate::texels`]).
     Texels,
 }
+
+/// Parts of their rays that some points are lit with to see how long that takes. With less than the first, points of small things,
+/// which pool with few, would be more unlike each other than what is around them.
+const TIMED: [f64; 2] = [0.125, 0.5];
 
 /// One attempt at writing light so that it is read back as well as was asked.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -100,6 +107,12 @@ pub(crate) struct Judge<'b, 'a> {
     /// Whether these are looked at, and whether points were lit with more rays if that helps.
     is_close: bool,
     is_relit: bool,
+    /// The part of its rays that a point is lit with: all but where a deadline leaves less time.
+    thinned: f64,
+    /// Seconds that a place takes with all rays, where that had to be known.
+    each: f64,
+    /// Whether a deadline left something undone.
+    hurried: AtomicBool,
 }
 
 impl<'b, 'a> Judge<'b, 'a> {
@@ -115,12 +128,72 @@ impl<'b, 'a> Judge<'b, 'a> {
             light: Vec::new(),
             is_close: false,
             is_relit: false,
+            thinned: 1.0,
+            each: 0.0,
+            hurried: AtomicBool::new(false),
         }
+    }
+
+    /// The part of its rays that a point is lit with: less than all where a deadline leaves no time for them.
+    pub fn thinned(&self) -> f64 {
+        self.thinned
     }
 
     /// What is judged.
     pub fn baked(&self) -> &'b Baked<'a> {
         self.baked
+    }
+
+    /// Where there is a deadline, finds with which part of their rays so many points are lit by it, and which part of them there is
+    /// time for where that is the least; time is kept for what comes `after`, relative to it. Places where light is read back are
+    /// timed: they are spread as points are.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn pace(&mut self, points: f64, after: f64, monitor: &dyn Monitor) -> Result<f64, Error> {
+        if pace::left(monitor).is_none() || self.more.is_empty() {
+            return Ok(1.0);
+        }
+        let (some, parts) = pace::sample(&self.more);
+        let mut times = [(0.0, 0.0); 2];
+        for (time, thinned) in times.iter_mut().zip(TIMED) {
+            self.thinned = thinned;
+            let (seconds, lit) = pace::timed(|| self.light(&some, 1, monitor).map(drop));
+            lit?;
+            *time = (thinned, seconds);
+        }
+        let cost = Cost::new(times, parts * points / self.more.len() as f64);
+        self.each = cost.seconds(1.0) / points.max(1.0);
+        let left = (pace::left(monitor).unwrap_or(0.0) - self.baked.audit_seconds()).max(0.0) / (1.0 + after);
+        self.thinned = cost.rays(left, [TIMED[0], 1.0]);
+        self.or_hurried(self.thinned >= 1.0);
+        Ok(cost.part(left, self.thinned))
+    }
+
+    /// Whether there is time to light so many points once more, with all their rays, and for what comes with it.
+    pub fn has_time(&self, points: f64, after: f64, monitor: &dyn Monitor) -> bool {
+        let seconds = (1.0 + after) * points * self.each + 2.0 * self.baked.audit_seconds();
+        self.or_hurried(self.thinned >= 1.0 && has_time(monitor, seconds))
+    }
+
+    /// Whether a deadline left something undone.
+    pub fn is_hurried(&self) -> bool {
+        self.hurried.load(Ordering::Relaxed)
+    }
+
+    /// Remembers it if there was no time.
+    fn or_hurried(&self, has_time: bool) -> bool {
+        self.hurried.fetch_or(!has_time, Ordering::Relaxed);
+        has_time
+    }
+
+    /// Whether there is time for so many of the points that share a texel, and for `after` texels after them, all with the rays
+    /// that they have. What edges lack is seen less than what texels of further pages would.
+    pub fn has_time_for_edges(&self, points: usize, of: u32, after: usize, monitor: &dyn Monitor) -> bool {
+        // Few rays are not for nothing: a point takes an eighth of what it takes alone, at least.
+        let share = (1.0 / f64::from(of)).max(0.125);
+        let seconds = self.each * (points as f64 * share + after as f64 * self.thinned.max(0.125));
+        self.or_hurried(has_time(monitor, seconds + self.baked.audit_seconds()))
     }
 
     /// Every place at which light will be read back.
@@ -171,13 +244,11 @@ impl<'b, 'a> Judge<'b, 'a> {
 
     /// Gather rays and shadow rays of a vertex, or of all further points of a texel.
     fn rays(&self) -> (usize, u32) {
-        match self.written {
-            Written::Vertices => (self.gather, self.shadowing.rays),
-            Written::Texels => {
-                let gather = gather_rays(self.baked.error);
-                (gather, (SHADOW_RAYS * gather) as u32)
-            }
-        }
+        let (gather, shadow) = match self.written {
+            Written::Vertices => (self.gather, self.shadowing.rays as usize),
+            Written::Texels => (gather_rays(self.baked.error), SHADOW_RAYS * gather_rays(self.baked.error)),
+        };
+        (thinned(gather, self.thinned), thinned(shadow, self.thinned) as u32)
     }
 
     /// Shadow rays of each of so many points.
@@ -199,7 +270,9 @@ impl<'b, 'a> Judge<'b, 'a> {
         if !self.is_close {
             let plain = |auditor: &Auditor| auditor.judge(&read_back);
             let audit = certify(&mut self.auditor, plain, *error, paths, stages, monitor)?;
-            if audit.upper <= *error || !achieved {
+            // Places do not share what they gather, and so have more rays.
+            let takes = self.each * (self.more.len() * (self.gather / self.rays().0.max(1)).max(1)) as f64;
+            if audit.upper <= *error || !achieved || !self.or_hurried(has_time(monitor, takes)) {
                 return Ok(audit);
             }
             // The edges that are left may be so narrow that no place of the audit meets one.
@@ -279,6 +352,11 @@ impl<'b, 'a> Judge<'b, 'a> {
         let Baked { error, stages, .. } = self.baked;
         certify(&mut self.auditor, |auditor| auditor.judge(at), target, most_paths(*error), stages, monitor)
     }
+}
+
+/// A part of some rays; no fewer than [`LEAST_RAYS`], unless there were fewer.
+fn thinned(rays: usize, part: f64) -> usize {
+    ((rays as f64 * part) as usize).max(rays.min(LEAST_RAYS as usize))
 }
 
 /// Root mean square illuminance over the exposed surfaces, lx: what relative errors are relative to.

@@ -5,12 +5,13 @@ use crate::canvas::Canvas;
 use crate::faces::lit_vertex;
 use crate::judge::{Judge, STEP, Written, WrittenRound, is_stalled, root_mean_square};
 use crate::monitor::is_over;
+use crate::pace::EDGES;
 use crate::{Error, Monitor};
 use glam::DVec2;
 use radiosity_io::gltf_out::{Encoding, Light, LitPrimitive, PageImage};
 use radiosity_io::image_out::encode_png;
 use radiosity_scene::display::srgb;
-use radiosity_scene::{Bands, Side};
+use radiosity_scene::{Bands, Mesh, Side};
 use radiosity_view::Audit;
 use radiosity_view::lightmap::{Allotment, Atlas, LightmapError, UnwrapParams};
 use std::collections::HashMap;
@@ -39,6 +40,8 @@ pub struct Lightmap {
     pub needed: Option<f64>,
     /// Root mean square difference across seams, before and after fitting them, lx.
     pub seams: [f64; 2],
+    /// Whether a deadline left something undone.
+    pub hurried: bool,
 }
 
 impl Lightmap {
@@ -69,6 +72,9 @@ pub const TEXEL_BYTES: usize = 400;
 const AUTOMATIC_TEXELS: f64 = 200_000.0;
 const CHART_TEXELS: f64 = 4.0;
 
+/// Part of these that there are however little time there is: texels twice as wide. Wider ones lose the shadows of furniture's legs.
+const LEAST_TEXELS: f64 = 0.25;
+
 /// How many times as many texels are spent for an error at most: more than a page of 2048 × 2048 is no lightmap for a room any
 /// more.
 const MOST_GROWTH: f64 = 20.0;
@@ -86,6 +92,12 @@ const ROUNDS: usize = 4;
 /// Texels of so many charts where no density is asked for.
 pub(crate) fn automatic_texels(charts: usize) -> f64 {
     AUTOMATIC_TEXELS.max(CHART_TEXELS * charts as f64)
+}
+
+/// About how many texels the light of a mesh is written in where no density is asked for; most often, a chart has two triangles or
+/// more.
+pub fn points_about(mesh: &Mesh) -> usize {
+    automatic_texels(mesh.triangles.len() / 2) as usize
 }
 
 /// A vertex of a primitive: its slot, source corners, weights and texture coordinates, the floats by their bits.
@@ -107,13 +119,19 @@ pub fn lightmap(
     let mut canvas = Canvas::new(&baked.solution, &params)?;
     let most = (baked.solution.memory_allowed() / TEXEL_BYTES) as f64;
     let budget = automatic_texels(canvas.charts.len()).min(most);
-    params.texels_per_metre =
-        texels_per_metre.or_else(|| canvas.charts.density_for(budget)).unwrap_or(params.texels_per_metre);
+    let mut judge = Judge::new(baked, Written::Texels);
+    // Where there is no time for that many with the fewest rays, there are fewer.
+    let part = if texels_per_metre.is_none() { judge.pace(budget, EDGES, monitor)? } else { 1.0 };
+    params.texels_per_metre = texels_per_metre
+        .or_else(|| canvas.charts.density_for(budget * part.max(LEAST_TEXELS)))
+        .unwrap_or(params.texels_per_metre);
     let texels = canvas.charts.texel_count(params.texels_per_metre);
     if texels > most {
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
-    let mut judge = Judge::new(baked, Written::Texels);
+    if texels_per_metre.is_some() {
+        judge.pace(texels, EDGES, monitor)?;
+    }
     let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
     let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
     let mut rounds = vec![drawn.round(&audit)];
@@ -121,7 +139,12 @@ pub fn lightmap(
     // Finer texels while the map misses what the solution has and the texels that are needed can be had.
     let tolerance = baked.error * root_mean_square(&baked.solution);
     let mut needed = None;
-    while texels_per_metre.is_none() && rounds.len() <= ROUNDS && !is_stalled(&rounds) && !is_over(monitor) {
+    while texels_per_metre.is_none()
+        && rounds.len() <= ROUNDS
+        && !is_stalled(&rounds)
+        && !is_over(monitor)
+        && judge.has_time(STEP * texels, EDGES, monitor)
+    {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let detail = canvas.detail(&drawn, tolerance);
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
@@ -135,7 +158,8 @@ pub fn lightmap(
         // As far as a round may go; if not all the way, it is not the last.
         let steps = std::iter::successors(Some(goal.left.max(STEP)), |left| Some(STEP_BACK * left))
             .take_while(|left| *left < 1.0);
-        let Some(step) = steps.filter_map(allot).find(|step| lit(step) <= MOST_LIT * budget) else { break };
+        let is_near = |step: &Allotment| lit(step) <= MOST_LIT * budget && judge.has_time(lit(step), EDGES, monitor);
+        let Some(step) = steps.filter_map(allot).find(is_near) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
         drawn = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;
@@ -153,6 +177,7 @@ pub fn lightmap(
         audit,
         seams: [drawn.seams.before, drawn.seams.after],
         rounds,
+        hurried: judge.is_hurried(),
         pages: drawn.atlas.pages,
         irradiance: drawn.irradiance,
     })

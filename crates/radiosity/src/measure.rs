@@ -332,6 +332,9 @@ pub(crate) fn most_paths(error: f64) -> u32 {
     rays_for(error, 4096.0, 64, 1 << 16) as u32
 }
 
+/// Paths per estimate that every audit begins with.
+pub(crate) const FIRST_PATHS: u32 = 64;
+
 /// Paths of the referee, over all places, before a miss is believed: a few thousand, and what one bright path in them
 /// says of a few places may be wrong by more than its own scatter tells.
 const SURE: u32 = 1 << 16;
@@ -364,16 +367,19 @@ fn certify_unless(
     stages: &Stages,
     monitor: &dyn Monitor,
 ) -> Result<Audit, Error> {
+    let start = Instant::now();
     stages.time(monitor, "audit", || {
         let total = auditor.places().len();
-        if auditor.paths() == 0 && !auditor.trace(64, |done| monitor.step(done, total)) {
+        if auditor.paths() == 0 && !auditor.trace(FIRST_PATHS, |done| monitor.step(done, total)) {
             return Err(Error::Stopped);
         }
         let least = SURE.div_ceil(total.max(1) as u32);
         loop {
             let audit = judge(auditor);
             let unsure = !is_given_up(&audit, target) || auditor.paths() < least;
-            let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths && !is_over(monitor);
+            // As many paths again take about as long as all so far, of which those of this call are known.
+            let again = stages.of("audit") + start.elapsed().as_secs_f64();
+            let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths && has_time(monitor, again);
             if !open {
                 return Ok(audit);
             }

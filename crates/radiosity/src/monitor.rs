@@ -23,8 +23,9 @@ pub trait Monitor: Sync {
     /// A whole solution is there: the first before any row is traced, then after each solve.
     fn solved(&self, _solution: &Solution) {}
     /// When the answer so far will do; none for never. What is asked for then ends with what it has by that time: a whole
-    /// answer, with its error. It ends a little later, as it takes the least that an audit needs, the writing and, where there
-    /// are no more than a hundred thousand elements, the first few rays of each, however late that is. Of more elements those
+    /// answer, with its error. Refinement leaves time for what is made of the solution ([`crate::BakeOptions::after`]), which has as many
+    /// rays as there is time for. It ends later where the least takes longer: an audit, a pass of few rays over what is seen or written
+    /// and, where there are no more than a hundred thousand elements, the first few rays of each. Of more elements those
     /// that were not reached have the mean of the others' direct light, and without rays all have the ambient term
     /// ([`Solution::begin`]). How far it comes depends on the machine, and so do its bytes; all else does not.
     fn deadline(&self) -> Option<Instant> {
@@ -159,6 +160,11 @@ impl Stages {
             Some((_, s)) => *s += seconds,
             None => all.push((name.to_owned(), seconds)),
         }
+    }
+
+    /// The seconds of a stage.
+    pub(crate) fn of(&self, name: &str) -> f64 {
+        self.all().into_iter().find(|(n, _)| n == name).map_or(0.0, |(_, seconds)| seconds)
     }
 
     /// All stages with their seconds.

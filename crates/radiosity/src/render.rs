@@ -1,14 +1,17 @@
 //! A picture of a solution: direct light evaluated for each pixel, indirect light from the continuous field.
 
-use crate::answer::Station;
+use crate::answer::{Station, read};
 use crate::measure::{certify, most_paths};
-use crate::monitor::Monitor;
-use crate::{Baked, Error, Indirect};
-use radiosity_scene::{Bands, Camera, luminance};
+use crate::monitor::{Monitor, Timed};
+use crate::pace::{self, Cost};
+use crate::{Baked, Error, Indirect, Solution};
+use radiosity_scene::{Bands, Camera, Side, luminance};
 use radiosity_trace::Place;
 use radiosity_trace::sampling::{hash, unit};
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor, Picture, ViewRays};
+use std::collections::HashMap;
+use std::time::Duration;
 
 /// How to make a picture.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +30,33 @@ impl Default for RenderOptions {
     }
 }
 
+/// Shadow rays of a pixel, however little time there is: with 8 penumbrae have steps that one sees from afar, and 16 take little more,
+/// as much of what a pixel takes is taken by none.
+const LEAST_SHADOW_RAYS: u32 = 16;
+
+/// Part of the time left that the camera's rays may take; where it is more, each side of a pixel has so many samples instead of four:
+/// edges are still softened.
+const CAST: f64 = 0.15;
+const FEWEST_SAMPLES: u32 = 2;
+
+/// By how much smaller along each side a picture is that tells how long its rays take.
+const SMALLER: u32 = 16;
+
+/// Pixels along a side of the squares whose pixels share their direct light where the fewest rays are too many still: most of what a
+/// pixel takes goes to finding what its lights would give. Wider ones make stairs of shadows' edges that one sees.
+const SQUARE: u32 = 2;
+
+/// Shadow rays that a part of the pixels is timed with: enough to tell what each takes.
+const TIMED_SHADOW_RAYS: u32 = 64;
+
+/// Part of the time that cells that are seen may gather in, where it does not do for all: shadows and what is reflected are seen alike.
+const GATHERED: f64 = 0.5;
+
+/// Audits of what is seen relative to those of surfaces, and what an audit and the file take of the time for each second that the
+/// camera's rays take: 16 of them go to each pixel.
+const SEEN: f64 = 1.5;
+const ENCODED: f64 = 0.2;
+
 /// What a camera sees.
 #[derive(Clone, Debug)]
 pub struct View {
@@ -36,6 +66,8 @@ pub struct View {
     pub illuminance: Vec<f32>,
     /// Places that are seen, spread over the pixels, and their irradiance there.
     pub watched: Vec<(Place, Bands)>,
+    /// Shadow rays per pixel: those that were asked for, or what a deadline left of them.
+    pub shadow_rays: u32,
 }
 
 impl View {
@@ -52,14 +84,15 @@ impl View {
 }
 
 /// Looks at a solution. Cells that are seen gather their indirect light until its noise is below the error that the solution was
-/// made for, as far as some thousands of rays bring it.
+/// made for, as far as some thousands of rays bring it. Within a deadline that leaves too little for this, cells gather and pixels are
+/// lit with fewer rays, for which a part of them is timed; time for the audit is left.
 ///
 /// # Errors
 /// [`Error::Stopped`].
 pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: &dyn Monitor) -> Result<View, Error> {
     monitor.stage("picture");
     let solution = &baked.solution;
-    let view = ViewRays::new(solution.tracer(), camera, options.width, options.height);
+    let (cast, view) = pace::timed(|| cast(solution, camera, options, monitor));
     let stations: Vec<Station> =
         view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
     let mut looks = vec![0; solution.elements.cells()];
@@ -68,8 +101,33 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
             looks[solution.elements.cell(element)] += 1;
         }
     }
-    let field = solution.field_on(&looks, baked.received.clone(), baked.error, monitor)?;
-    let answer = solution.at(&stations, Indirect::Field(&field), &options.shadowing, monitor)?;
+    let mut shadowing = options.shadowing;
+    let light = baked.received.clone();
+    let (field, enough) = match pace::left(monitor) {
+        None => (solution.field_on(&looks, light, baked.error, monitor)?, true),
+        Some(_) => {
+            let after = SEEN * baked.audit_seconds() + ENCODED * cast;
+            let asked = f64::from(options.shadowing.rays);
+            let left = || pace::left(monitor).map_or(0.0, |left| (left - after).max(0.0));
+            let lit = cost(solution, &stations, &options.shadowing, monitor)?.seconds(asked);
+            let gather = (left() - lit).max(GATHERED * left());
+            let within = Timed::new(monitor, Duration::from_secs_f64(gather));
+            let field = solution.field_on(&looks, light, baked.error, &within)?;
+            // Timed once more: others may have come or gone since.
+            let least = f64::from(LEAST_SHADOW_RAYS.min(options.shadowing.rays));
+            let cost = cost(solution, &stations, &options.shadowing, monitor)?;
+            shadowing.rays = cost.rays(left(), [least, asked]) as u32;
+            (field, cost.part(left(), least) >= 1.0)
+        }
+    };
+    let answer = if enough {
+        solution.at(&stations, Indirect::Field(&field), &shadowing, monitor)?
+    } else {
+        let (own, of) = squares(&view, SQUARE);
+        let places: Vec<Place> = own.iter().map(|&i| stations[i].place).collect();
+        let lit = solution.direct_at(&places, &shadowing, monitor)?;
+        read(&stations, of.into_iter().map(|k| lit[k]).collect(), &field)
+    };
     let pixels = view.own.len();
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
     for (seen, e) in view.seen.iter().zip(&answer.irradiance) {
@@ -85,5 +143,53 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
     };
     let watched = (0..count).map(pick).map(|i| (stations[i].place, answer.irradiance[i])).collect();
-    Ok(View { picture: view.picture(&answer.irradiance), illuminance, watched })
+    Ok(View { picture: view.picture(&answer.irradiance), illuminance, watched, shadow_rays: shadowing.rays })
+}
+
+/// Casts the camera's rays, fewer of them where a small picture tells that they would take too much of the time.
+fn cast(solution: &Solution, camera: &Camera, options: &RenderOptions, monitor: &dyn Monitor) -> ViewRays {
+    let (tracer, RenderOptions { width, height, .. }) = (solution.tracer(), *options);
+    if let Some(left) = pace::left(monitor) {
+        let small = [width, height].map(|side| side.div_ceil(SMALLER));
+        let (seconds, _) = pace::timed(|| ViewRays::new(tracer, camera, small[0], small[1]));
+        let larger = f64::from(width) * f64::from(height) / (f64::from(small[0]) * f64::from(small[1]));
+        if seconds * larger > CAST * left {
+            return ViewRays::sampled(tracer, camera, (width, height), FEWEST_SAMPLES);
+        }
+    }
+    ViewRays::new(tracer, camera, width, height)
+}
+
+/// One of all that is seen of a triangle's side in each square of so many pixels, and for each that is seen which of them stands for
+/// it.
+fn squares(view: &ViewRays, side: u32) -> (Vec<usize>, Vec<usize>) {
+    let (mut own, mut of) = (Vec::new(), Vec::with_capacity(view.seen.len()));
+    let mut known: HashMap<(u32, u32, Side, bool), usize> = HashMap::new();
+    for (i, seen) in view.seen.iter().enumerate() {
+        let (row, column) = (seen.pixel / view.width / side, seen.pixel % view.width / side);
+        let square = row * view.width + column;
+        let stands = *known.entry((square, seen.place.triangle, seen.side, seen.behind)).or_insert(own.len());
+        if stands == own.len() {
+            own.push(i);
+        }
+        of.push(stands);
+    }
+    (own, of)
+}
+
+/// What direct light of all pixels takes by its shadow rays.
+fn cost(
+    solution: &Solution,
+    stations: &[Station],
+    shadowing: &Shadowing,
+    monitor: &dyn Monitor,
+) -> Result<Cost, Error> {
+    let (some, parts) = pace::sample(stations);
+    let places: Vec<Place> = some.iter().map(|station| station.place).collect();
+    let time = |rays: u32| {
+        let (seconds, lit) =
+            pace::timed(|| solution.direct_at(&places, &Shadowing { rays, ..*shadowing }, monitor).map(drop));
+        lit.map(|()| (f64::from(rays), seconds))
+    };
+    Ok(Cost::new([time(LEAST_SHADOW_RAYS)?, time(TIMED_SHADOW_RAYS)?], parts))
 }

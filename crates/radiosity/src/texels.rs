@@ -27,6 +27,9 @@ const FIRST_GATHERED: usize = 64;
 const FIRST_SHADOW: f64 = 128.0;
 const LEAST_SHADOW: usize = 32;
 
+/// Fewest first rays where there is no time for all.
+const LEAST_THINNED: usize = 16;
+
 /// Noise that is left in what is gathered, and in direct light, relative to the error asked: two fifths of the squared error
 /// together, the rest of what solutions may have ([`crate::judge`]) is for what is not noise.
 const GATHERED_NOISE: f64 = 0.5;
@@ -103,7 +106,7 @@ impl Found {
     }
 }
 
-/// Lights the texels of a page that lie at stations.
+/// Lights the texels of a page that lie at stations. Where they are `thinned`, they have that part of the first rays, and no more.
 ///
 /// # Errors
 /// [`Error::Stopped`].
@@ -111,7 +114,7 @@ pub(crate) fn light(
     baked: &Baked,
     sheet: Sheet,
     at: &[Station],
-    gathers: bool,
+    (gathers, thinned): (bool, f64),
     monitor: &dyn Monitor,
 ) -> Result<TexelLight, Error> {
     let (solution, error) = (&baked.solution, baked.error);
@@ -119,11 +122,12 @@ pub(crate) fn light(
     let of = |own: &[usize]| -> Vec<Place> { own.iter().map(|i| places[*i]).collect() };
     let pooled = |found: &Found| sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.noise, &found.rays);
 
+    let thin = |rays: usize| ((rays as f64 * thinned) as usize).max(rays.min(LEAST_THINNED));
     let shadowing = |rays: u32| Shadowing { places: 1, rays };
-    let first = rays_for(error, FIRST_SHADOW, LEAST_SHADOW, 1024) as u32;
+    let first = thin(rays_for(error, FIRST_SHADOW, LEAST_SHADOW, 1024)) as u32;
     let half = |salt| solution.direct_by(&places, &shadowing(first / 2), salt, monitor);
     let mut direct = Found::of_halves(sheet, half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]), first);
-    let first = gather_rays(error).min(FIRST_GATHERED);
+    let first = thin(gather_rays(error).min(FIRST_GATHERED));
     let (mut gathered, mut indirect) = if gathers {
         let halves = solution.halves_at(&places, first, 0, monitor)?;
         let gathered = Found::of_halves(sheet, halves.into_iter(), first as u32);
@@ -134,6 +138,9 @@ pub(crate) fn light(
         (None, at.iter().map(|station| Pooled { light: told(station), own: 1.0, noise: 0.0, spread: 0.0 }).collect())
     };
 
+    if thinned < 1.0 {
+        return Ok(TexelLight { direct: direct.light, indirect });
+    }
     let area = sheet.atlas.areas(sheet.texels);
     let mean = root_mean_square(solution);
     let ceiling =

@@ -27,6 +27,8 @@ pub struct VertexLight {
     pub audit: Audit,
     /// The attempts, each with more vertices or rays than the one before.
     pub rounds: Vec<WrittenRound>,
+    /// Whether a deadline left something undone.
+    pub hurried: bool,
 }
 
 /// Most vertices that are spent for an error: some 50 MB of model.
@@ -50,13 +52,18 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
         (0..solution.tracer().mesh.triangles.len()).map(|t| solution.elements.division(t)).collect();
     let mut known = HashMap::new();
     let mut lattice = Lattice::new(solution, &faces, &division, &judge);
+    judge.pace(lattice.at.len() as f64, 0.0, monitor)?;
     let mut lit = lattice.light(solution, &judge, &mut known, monitor)?;
     let mut audit = judge.audit(monitor, |station| lattice.read(station))?;
     let mut rounds = vec![lattice.round(lit, &audit)];
 
     let tolerance = baked.error * root_mean_square(solution);
     let most = MOST_VERTICES.min((solution.memory_allowed() / VERTEX_BYTES) as f64);
-    while rounds.len() <= ROUNDS && !is_stalled(&rounds) && !is_over(monitor) {
+    while rounds.len() <= ROUNDS
+        && !is_stalled(&rounds)
+        && !is_over(monitor)
+        && judge.has_time(lattice.at.len() as f64, 0.0, monitor)
+    {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let lost = lattice.lost(solution, &faces, tolerance);
         let finer = |left: f64| finer(&faces, &lost, &division, left, most);
@@ -71,7 +78,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
         audit = judge.audit(monitor, |station| lattice.read(station))?;
         rounds.push(lattice.round(lit, &audit));
     }
-    Ok(VertexLight { primitives: lattice.primitives, audit, rounds })
+    Ok(VertexLight { primitives: lattice.primitives, audit, rounds, hurried: judge.is_hurried() })
 }
 
 /// Divisions with which a part `goal` is left of what is `lost` by face; nothing where that takes more than `most` vertices,

@@ -4,8 +4,8 @@ use glam::DVec3;
 use radiosity::display::{delta_e, tone_map};
 use radiosity::solve::{Params, Solver};
 use radiosity::{
-    BakeOptions, Bands, Displayed, Elements, Error, Material, MeasureOptions, Mesh, Monitor, Scene, Sky, Solution,
-    SolveOptions, Timed, Tracer, bake, cornell_box, measure,
+    BakeOptions, Bands, Displayed, Elements, Error, Material, MeasureOptions, Mesh, Monitor, RenderOptions, Scene, Sky,
+    Solution, SolveOptions, Timed, Tracer, View, bake, cornell_box, measure, render,
 };
 use std::time::Duration;
 
@@ -146,6 +146,22 @@ fn catalogue_42_a_limit_of_time_leaves_a_whole_answer() {
     assert!(baked.solution.irradiance().iter().flatten().all(|e| e.is_finite()));
     let light = radiosity::vertex_light(&baked, &none).unwrap();
     assert!(light.rounds.len() == 1 && light.audit.upper < 0.5, "{:?}", light.audit);
+    assert!(light.hurried);
+    // What is seen and written has the fewest rays then, and all of them without a limit.
+    let size = RenderOptions { width: 48, height: 48, ..RenderOptions::default() };
+    let look = |monitor: &dyn Monitor| render(&baked, &scene.cameras[0], &size, monitor).unwrap();
+    let (hurried, usual) = (look(&none), look(&()));
+    assert_eq!((hurried.shadow_rays, usual.shadow_rays), (16, size.shadowing.rays));
+    let mean = |view: &View| view.picture.pixels.iter().flatten().sum::<f32>() / (48 * 48) as f32;
+    assert!((mean(&hurried) / mean(&usual) - 1.0).abs() < 0.05, "{} and {}", mean(&hurried), mean(&usual));
+    let map = radiosity::lightmap(&baked, None, 4096, &none).unwrap();
+    assert!(map.hurried && map.rounds.len() == 1 && map.texels < 100_000, "{} texels", map.texels);
+    assert!(map.audit.upper < 0.5, "{:?}", map.audit);
+    // Where there is time, nothing is spared.
+    let hour = Timed::new(&(), Duration::from_secs(3600));
+    assert_eq!(look(&hour).shadow_rays, size.shadowing.rays);
+    let all = radiosity::lightmap(&baked, Some(20.0), 4096, &hour).unwrap();
+    assert!(!all.hurried, "{} texels", all.texels);
 
     let points = [(DVec3::new(0.3, 0.0, 0.3), DVec3::Y), (DVec3::new(0.1, 0.0, 0.1), DVec3::Y)];
     let asked = MeasureOptions { error: 1e-3, solve, ..MeasureOptions::default() };

@@ -50,12 +50,17 @@ pub struct ViewRays {
 impl ViewRays {
     /// Casts the camera's rays.
     pub fn new(tracer: &Tracer, camera: &Camera, width: u32, height: u32) -> ViewRays {
+        ViewRays::sampled(tracer, camera, (width, height), GRID)
+    }
+
+    /// The same with so many samples along each side of a pixel.
+    pub fn sampled(tracer: &Tracer, camera: &Camera, (width, height): (u32, u32), grid: u32) -> ViewRays {
         let rows: Vec<(Vec<Seen>, Vec<Bands>)> = (0..height)
             .into_par_iter()
             .map(|row| {
                 let (mut seen, mut own) = (Vec::new(), Vec::new());
                 for column in 0..width {
-                    own.push(cast_pixel(tracer, camera, (width, height), (column, row), &mut seen));
+                    own.push(cast_pixel(tracer, camera, (width, height), (column, row, grid), &mut seen));
                 }
                 (seen, own)
             })
@@ -88,20 +93,20 @@ fn cast_pixel(
     tracer: &Tracer,
     camera: &Camera,
     (width, height): (u32, u32),
-    (column, row): (u32, u32),
+    (column, row, grid): (u32, u32, u32),
     seen: &mut Vec<Seen>,
 ) -> Bands {
     let aspect = f64::from(width) / f64::from(height);
-    let share = 1.0 / (GRID * GRID) as f32;
+    let share = 1.0 / (grid * grid) as f32;
     let first = seen.len();
     let pixel = row * width + column;
     let mut own = [0f32; 3];
-    for sample in 0..GRID * GRID {
-        let x = (f64::from(column) + (f64::from(sample % GRID) + 0.5) / f64::from(GRID)) / f64::from(width);
-        let y = (f64::from(row) + (f64::from(sample / GRID) + 0.5) / f64::from(GRID)) / f64::from(height);
+    for sample in 0..grid * grid {
+        let x = (f64::from(column) + (f64::from(sample % grid) + 0.5) / f64::from(grid)) / f64::from(width);
+        let y = (f64::from(row) + (f64::from(sample / grid) + 0.5) / f64::from(grid)) / f64::from(height);
         let (origin, direction) = camera.ray(2.0 * x - 1.0, 1.0 - 2.0 * y, aspect);
         let scene = tracer.scene;
-        match tracer.seen(&tracer.free_ray(origin, direction), pixel * GRID * GRID + sample) {
+        match tracer.seen(&tracer.free_ray(origin, direction), pixel * grid * grid + sample) {
             Found::Back => {}
             Found::Escaped => {
                 let sky = scene.sky.luminance(direction, scene.up.direction());
