@@ -5,6 +5,7 @@ use crate::lightmap::automatic_texels;
 use crate::measure::{FIRST_PATHS, ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::pace::{self, After, Paced};
+use crate::texels::usual_rays;
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
 use radiosity_scene::Bands;
 use radiosity_trace::Tracer;
@@ -176,9 +177,9 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 audit: seconds_of_audit(&stages, &auditor),
             };
             // Points that are written have as many rays by the error asked.
-            let written = gather_rays(options.error);
-            let shadow_rays = shadowing.rays.min(2 * written as u32);
-            paced.keep(options.after.full(&takes, f64::from(shadow_rays), gather.min(written) as f64));
+            let [gather_rays, shadow_rays] = usual_rays(options.error);
+            let shadow_rays = shadow_rays.min(shadowing.rays as usize);
+            paced.keep(options.after.full(&takes, shadow_rays as f64, gather.min(gather_rays) as f64));
             Ok::<_, Error>((audit, Reading { gather, shadowing, light }))
         };
         // The field does not know contacts below the size of its elements: gathering at each point does, and costs less

@@ -10,6 +10,7 @@ use crate::bake::{Baked, GATHERS, gather_rays};
 use crate::measure::{brought_nothing, certify, most_paths};
 use crate::monitor::has_time;
 use crate::pace::{self, Cost};
+use crate::texels::usual_rays;
 use crate::{Error, Indirect, Monitor, Solution, stations};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
@@ -40,10 +41,6 @@ pub(crate) fn is_stalled(rounds: &[WrittenRound]) -> bool {
 
 /// Fewest shadow rays, and gather rays, at a point that is one of many.
 const LEAST_RAYS: u32 = 8;
-
-/// Shadow rays of all further points of a texel together, for each gather ray that they have: as many as the first points of texels have
-/// where light is rough, so that an edge is as quiet as what is beside it.
-const SHADOW_RAYS: usize = 2;
 
 /// As what light is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -244,9 +241,9 @@ impl<'b, 'a> Judge<'b, 'a> {
 
     /// Gather rays and shadow rays of a vertex, or of all further points of a texel.
     fn rays(&self) -> (usize, u32) {
-        let (gather, shadow) = match self.written {
-            Written::Vertices => (self.gather, self.shadowing.rays as usize),
-            Written::Texels => (gather_rays(self.baked.error), SHADOW_RAYS * gather_rays(self.baked.error)),
+        let [gather, shadow] = match self.written {
+            Written::Vertices => [self.gather, self.shadowing.rays as usize],
+            Written::Texels => usual_rays(self.baked.error),
         };
         (thinned(gather, self.thinned), thinned(shadow, self.thinned) as u32)
     }

@@ -189,15 +189,17 @@ pub fn measure(
     let closer = (options.audit_points / watched.len().max(1)).clamp(1, CLOSER) as u32;
     let most_paths = most_paths(options.error).saturating_mul(closer);
     let mut rounds = Vec::new();
-    let planes = Planes::new(tracer.mesh, &solution.elements);
+    // Nothing is shared in the open: planes of a million triangles would take 360 MB and four seconds.
+    let is_on_surface = |place: &Place| (place.triangle as usize) < tracer.mesh.triangles.len();
+    let planes = places.iter().any(is_on_surface).then(|| Planes::new(tracer.mesh, &solution.elements));
     loop {
         let mut begun = Instant::now();
-        let mut irradiance = gathered((&solution, &planes), &places, gather, &shadowing, monitor)?;
+        let mut irradiance = gathered((&solution, planes.as_ref()), &places, gather, &shadowing, monitor)?;
         while gather < wanted && has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64()) {
             gather *= 2;
             shadowing.rays = (shadow_rays * gather / wanted).max(16) as u32;
             begun = Instant::now();
-            irradiance = gathered((&solution, &planes), &places, gather, &shadowing, monitor)?;
+            irradiance = gathered((&solution, planes.as_ref()), &places, gather, &shadowing, monitor)?;
         }
         let watched: Vec<Bands> = watched.iter().map(|&i| irradiance[i]).collect();
         // Where no better answer follows, this one is looked at as closely as it takes.
@@ -248,7 +250,7 @@ pub fn measure(
 /// to light and the error is that of all places together. What is bright the solution knows; the rays that
 /// are to be judged have no say in their number. Places of one plane share what they gather, as far as it is smooth.
 fn gathered(
-    (solution, planes): (&Solution, &Planes),
+    (solution, planes): (&Solution, Option<&Planes>),
     places: &[Place],
     gather: usize,
     shadowing: &Shadowing,
@@ -290,7 +292,8 @@ fn gathered(
             }
         }
     }
-    for ((i, direct), pooled) in on_planes.into_iter().zip(planes.pooled(&found)) {
+    let pooled = planes.map_or_else(Vec::new, |planes| planes.pooled(&found));
+    for ((i, direct), pooled) in on_planes.into_iter().zip(pooled) {
         irradiance[i] = std::array::from_fn(|band| direct[band] + pooled.light[band]);
     }
     // What paths find beyond what they look up may be less than nothing.

@@ -27,7 +27,7 @@ const FIRST_GATHERED: usize = 64;
 const FIRST_SHADOW: f64 = 128.0;
 const LEAST_SHADOW: usize = 32;
 
-/// Fewest first rays where there is no time for all.
+/// Fewest rays of a texel where there is no time for all: with half as many a shadow has steps that one sees.
 const LEAST_THINNED: usize = 16;
 
 /// Noise that is left in what is gathered, and in direct light, relative to the error asked: two fifths of the squared error
@@ -106,7 +106,13 @@ impl Found {
     }
 }
 
-/// Lights the texels of a page that lie at stations. Where they are `thinned`, they have that part of the first rays, and no more.
+/// Gather rays and shadow rays that a texel has in the mean in a furnished room, about; and further points of one texel together, so
+/// that an edge is as quiet as what is beside it.
+pub(crate) fn usual_rays(error: f64) -> [usize; 2] {
+    [1, 2].map(|times| times * gather_rays(error))
+}
+
+/// Lights the texels of a page that lie at stations. Where they are `thinned`, each has that part of the usual rays, and none more.
 ///
 /// # Errors
 /// [`Error::Stopped`].
@@ -122,15 +128,17 @@ pub(crate) fn light(
     let of = |own: &[usize]| -> Vec<Place> { own.iter().map(|i| places[*i]).collect() };
     let pooled = |found: &Found| sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.noise, &found.rays);
 
-    let thin = |rays: usize| ((rays as f64 * thinned) as usize).max(rays.min(LEAST_THINNED));
+    let (to_gather, shadow) = if thinned < 1.0 {
+        usual_rays(error).map(|rays| ((rays as f64 * thinned) as usize).max(LEAST_THINNED)).into()
+    } else {
+        (gather_rays(error).min(FIRST_GATHERED), rays_for(error, FIRST_SHADOW, LEAST_SHADOW, 1024))
+    };
     let shadowing = |rays: u32| Shadowing { places: 1, rays };
-    let first = thin(rays_for(error, FIRST_SHADOW, LEAST_SHADOW, 1024)) as u32;
-    let half = |salt| solution.direct_by(&places, &shadowing(first / 2), salt, monitor);
-    let mut direct = Found::of_halves(sheet, half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]), first);
-    let first = thin(gather_rays(error).min(FIRST_GATHERED));
+    let half = |salt| solution.direct_by(&places, &shadowing(shadow as u32 / 2), salt, monitor);
+    let mut direct = Found::of_halves(sheet, half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]), shadow as u32);
     let (mut gathered, mut indirect) = if gathers {
-        let halves = solution.halves_at(&places, first, 0, monitor)?;
-        let gathered = Found::of_halves(sheet, halves.into_iter(), first as u32);
+        let halves = solution.halves_at(&places, to_gather, 0, monitor)?;
+        let gathered = Found::of_halves(sheet, halves.into_iter(), to_gather as u32);
         let indirect = pooled(&gathered);
         (Some(gathered), indirect)
     } else {
