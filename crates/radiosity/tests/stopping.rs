@@ -152,7 +152,11 @@ fn catalogue_42_a_limit_of_time_leaves_a_whole_answer() {
     let look = |monitor: &dyn Monitor| render(&baked, &scene.cameras[0], &size, monitor).unwrap();
     let (hurried, usual) = (look(&none), look(&()));
     assert_eq!((hurried.shadow_rays, usual.shadow_rays), (16, size.shadowing.rays));
-    let mean = |view: &View| view.picture.pixels.iter().flatten().sum::<f32>() / (48 * 48) as f32;
+    // Of surfaces: few samples in a pixel may miss an edge of the lamp, which outshines all.
+    let mean = |view: &View| {
+        let lit: Vec<f32> = view.illuminance.iter().copied().filter(|e| e.is_finite()).collect();
+        lit.iter().sum::<f32>() / lit.len() as f32
+    };
     assert!((mean(&hurried) / mean(&usual) - 1.0).abs() < 0.05, "{} and {}", mean(&hurried), mean(&usual));
     let map = radiosity::lightmap(&baked, None, 4096, &none).unwrap();
     assert!(map.hurried && map.rounds.len() == 1 && map.texels < 100_000, "{} texels", map.texels);
