@@ -352,7 +352,7 @@ impl<'b, 'a> Judge<'b, 'a> {
 }
 
 /// A part of some rays; no fewer than [`LEAST_RAYS`], unless there were fewer.
-fn thinned(rays: usize, part: f64) -> usize {
+pub(crate) fn thinned(rays: usize, part: f64) -> usize {
     ((rays as f64 * part) as usize).max(rays.min(LEAST_RAYS as usize))
 }
 

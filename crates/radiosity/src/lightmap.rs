@@ -143,7 +143,7 @@ pub fn lightmap(
         && rounds.len() <= ROUNDS
         && !is_stalled(&rounds)
         && !is_over(monitor)
-        && judge.has_time(STEP * texels, EDGES, monitor)
+        && (audit.upper <= baked.error || !baked.achieved || judge.has_time(STEP * texels, EDGES, monitor))
     {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let detail = canvas.detail(&drawn, tolerance);

@@ -1,6 +1,6 @@
 //! Light of texels: a few rays for each, then more for those whose first ones disagree.
 //!
-//! Of n rays a texel keeps the variance s² ∝ 1/n^p. What counts is Σ A s² over the areas A of all texels, and the least Σ n
+//! Of n rays a texel keeps the variance s² ∝ 1/n^p. What counts is Σ A s² over the areas A of the texels that are lit, and the least Σ n
 //! for it has n in proportion to (A s²)^(1/(1 + p)): optimal allocation (Neyman 1934, where p is 1). s² is what two halves of
 //! the first rays, and those of the texels around, say; for what is gathered, after it was shared ([`Atlas::pooled`]). In a furnished office a
 //! twentieth of the texels has two thirds of the squared error, if all have as many rays.
@@ -10,8 +10,9 @@
 
 use crate::answer::Station;
 use crate::bake::{Baked, gather_rays};
-use crate::judge::root_mean_square;
+use crate::judge::{root_mean_square, thinned as thin};
 use crate::measure::rays_for;
+use crate::pace;
 use crate::{Error, Monitor};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
@@ -23,12 +24,11 @@ use radiosity_view::lightmap::{Atlas, Texel};
 /// some hundreds in all; and small things have few texels to share with: with half as many they are as different as checks are.
 const FIRST_GATHERED: usize = 64;
 
-/// First shadow rays of a texel at 1 %, of both halves; and at the least, as fewer would leave many of a dozen lamps without any.
+/// First shadow rays of a texel at 1 %, of both halves; at the least, as fewer would leave many of a dozen lamps without any; and at the most: more
+/// go where they are needed.
 const FIRST_SHADOW: f64 = 128.0;
 const LEAST_SHADOW: usize = 32;
-
-/// Fewest rays of a texel where there is no time for all: with half as many a shadow has steps that one sees.
-const LEAST_THINNED: usize = 16;
+const MOST_SHADOW: usize = 1024;
 
 /// Noise that is left in what is gathered, and in direct light, relative to the error asked: two fifths of the squared error
 /// together, the rest of what solutions may have ([`crate::judge`]) is for what is not noise.
@@ -39,15 +39,15 @@ const DIRECT_NOISE: f64 = 0.4;
 const GATHERED_POWER: f64 = 1.0;
 const DIRECT_POWER: f64 = 1.4;
 
-/// Noise of one texel relative to its own light at most, in errors asked: at 2 % three times it is not seen on small things, and
+/// Noise of one texel relative to its own light at most, about, in errors asked: at 2 % three times it is not seen on small things, and
 /// six times it is.
 const VISIBLE: f64 = 3.0;
 
 /// Light below this part of the mean counts as if it was as much: in the dark little is seen. In a furnished office at 2 % the noise of
-/// small dark things that this allows takes a fifteenth of the rays; with a tenth, four times as many are needed in all.
+/// small dark things that this allows takes a fifteenth of the rays; with a tenth, more than twice as many are needed in all.
 const DARK: f64 = 0.25;
 
-/// Doublings of the first rays at most: what is noisy after 2,048 is a texel with a lamp in its face.
+/// Doublings of the first rays at most: what is noisy after thirty-two times as many is a texel with a lamp in its face.
 const MOST_DOUBLINGS: u32 = 5;
 
 /// A page and those of its texels that are lit, none of them inside a solid.
@@ -106,8 +106,8 @@ impl Found {
     }
 }
 
-/// Gather rays and shadow rays that a texel has in the mean in a furnished room, about; and further points of one texel together, so
-/// that an edge is as quiet as what is beside it.
+/// Gather rays and shadow rays that a texel has in the mean in a furnished room, about, or somewhat more; and further points of one
+/// texel together, so that most edges are as quiet as what is beside them.
 pub(crate) fn usual_rays(error: f64) -> [usize; 2] {
     [1, 2].map(|times| times * gather_rays(error))
 }
@@ -128,17 +128,22 @@ pub(crate) fn light(
     let of = |own: &[usize]| -> Vec<Place> { own.iter().map(|i| places[*i]).collect() };
     let pooled = |found: &Found| sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.noise, &found.rays);
 
-    let (to_gather, shadow) = if thinned < 1.0 {
-        usual_rays(error).map(|rays| ((rays as f64 * thinned) as usize).max(LEAST_THINNED)).into()
+    let shadowing = |rays: usize| Shadowing { places: 1, rays: rays as u32 };
+    let (first, shadow) = if thinned < 1.0 {
+        usual_rays(error).map(|rays| thin(rays, thinned)).into()
     } else {
-        (gather_rays(error).min(FIRST_GATHERED), rays_for(error, FIRST_SHADOW, LEAST_SHADOW, 1024))
+        (gather_rays(error).min(FIRST_GATHERED), rays_for(error, FIRST_SHADOW, LEAST_SHADOW, MOST_SHADOW))
     };
-    let shadowing = |rays: u32| Shadowing { places: 1, rays };
-    let half = |salt| solution.direct_by(&places, &shadowing(shadow as u32 / 2), salt, monitor);
-    let mut direct = Found::of_halves(sheet, half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]), shadow as u32);
+    let mut direct = if thinned < 1.0 {
+        let light = solution.direct_at(&places, &shadowing(shadow), monitor)?;
+        Found { noise: vec![0.0; light.len()], rays: vec![shadow as u32; light.len()], light }
+    } else {
+        let half = |salt| solution.direct_by(&places, &shadowing(shadow / 2), salt, monitor);
+        Found::of_halves(sheet, half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]), shadow as u32)
+    };
     let (mut gathered, mut indirect) = if gathers {
-        let halves = solution.halves_at(&places, to_gather, 0, monitor)?;
-        let gathered = Found::of_halves(sheet, halves.into_iter(), to_gather as u32);
+        let halves = solution.halves_at(&places, first, 0, monitor)?;
+        let gathered = Found::of_halves(sheet, halves.into_iter(), first as u32);
         let indirect = pooled(&gathered);
         (Some(gathered), indirect)
     } else {
@@ -154,11 +159,17 @@ pub(crate) fn light(
     let ceiling =
         |(d, p): (&Bands, &Pooled)| VISIBLE * error * f64::from(luminance(*d) + luminance(p.light)).max(DARK * mean);
     let ceilings: Vec<f64> = direct.light.iter().zip(&indirect).map(ceiling).collect();
-    let times = growth(&direct.noise, &area, &ceilings, DIRECT_NOISE * error * mean, DIRECT_POWER);
-    direct.grow((&times, DIRECT_POWER), |own, rays| solution.direct_by(&of(own), &shadowing(rays), 3, monitor))?;
+    // What is planned within a deadline are the usual rays, and no more are sent.
+    let [most_gathered, most_shadow] = usual_rays(error).map(|rays| pace::left(monitor).map(|_| rays as f64));
+    let mut times = growth(&direct.noise, &area, &ceilings, DIRECT_NOISE * error * mean, DIRECT_POWER);
+    curb(&mut times, most_shadow.map(|most| most / shadow as f64));
+    direct.grow((&times, DIRECT_POWER), |own, rays| {
+        solution.direct_by(&of(own), &shadowing(rays as usize), 3, monitor)
+    })?;
     if let Some(gathered) = &mut gathered {
         let spread: Vec<f32> = indirect.iter().map(|p| p.spread).collect();
-        let times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * mean, GATHERED_POWER);
+        let mut times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * mean, GATHERED_POWER);
+        curb(&mut times, most_gathered.map(|most| most / first as f64));
         gathered.grow((&times, GATHERED_POWER), |own, rays| {
             let halves = solution.halves_at(&of(own), rays as usize, 1, monitor)?;
             Ok(halves.into_iter().map(|[a, b]| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect())
@@ -166,6 +177,15 @@ pub(crate) fn light(
         indirect = pooled(gathered);
     }
     Ok(TexelLight { direct: direct.light, indirect })
+}
+
+/// Lets rays grow to so many times as many in the mean, at most.
+fn curb(times: &mut [f64], most: Option<f64>) {
+    times.iter_mut().for_each(|t| *t = t.min(f64::from(1 << MOST_DOUBLINGS)));
+    let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
+    let Some(most) = most.filter(|most| mean > *most) else { return };
+    let part = (most - 1.0).max(0.0) / (mean - 1.0);
+    times.iter_mut().for_each(|t| *t = 1.0 + part * (*t - 1.0));
 }
 
 /// How many times as many rays each texel is to have, so that the root mean square of `noise` over `area` becomes `target`, lx, with the
@@ -210,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_falls_to_what_is_asked_with_half_the_rays_that_all_alike_would_take() {
+    fn noise_falls_to_what_is_asked_with_fewer_rays_than_all_alike_would_take() {
         let (noise, area) = some();
         let none = vec![f64::INFINITY; noise.len()];
         for power in [1.0, 1.4] {
@@ -234,6 +254,11 @@ mod tests {
             let is_seen = i % 2 == 0 && noise[i] > 1.0;
             assert!(if is_seen { (f64::from(noise[i]).powi(2) - times).abs() < 1e-3 } else { *times == 1.0 });
         }
+        // What a deadline allows is shared by those that grow.
+        let mut curbed = times.clone();
+        curb(&mut curbed, Some(2.0));
+        let mean = curbed.iter().sum::<f64>() / curbed.len() as f64;
+        assert!((mean - 2.0).abs() < 1e-9 && curbed.iter().zip(&times).all(|(c, t)| *c >= 1.0 && c <= t), "{mean}");
         // In the dark nothing is asked for.
         let dark = growth(&[0.0; 3], &[1.0; 3], &[0.0; 3], 0.0, 1.0);
         assert_eq!(dark, [1.0; 3]);

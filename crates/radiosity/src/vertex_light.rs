@@ -62,7 +62,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
     while rounds.len() <= ROUNDS
         && !is_stalled(&rounds)
         && !is_over(monitor)
-        && judge.has_time(lattice.at.len() as f64, 0.0, monitor)
+        && (audit.upper <= baked.error || !baked.achieved || judge.has_time(lattice.at.len() as f64, 0.0, monitor))
     {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let lost = lattice.lost(solution, &faces, tolerance);

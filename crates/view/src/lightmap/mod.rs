@@ -148,8 +148,8 @@ struct Placed {
     collapsed: [Option<f64>; 2],
     /// Texels along the axes, not yet rotated.
     size: [u32; 2],
-    /// m².
-    area: f64,
+    /// Surface that a texel stands for, about, m².
+    texel: f64,
     at: Placement,
 }
 
@@ -185,7 +185,7 @@ impl Charts {
         params.check()?;
         let mut reduced = 0;
         let mut charts = Vec::with_capacity(self.charts.len());
-        for (chart, finer) in self.charts.iter().zip(&self.finer) {
+        for (index, (chart, finer)) in self.charts.iter().zip(&self.finer).enumerate() {
             // Scale to texels; too large a chart gets what a page can hold.
             let most = f64::from(params.max_page - 1) / chart.extent.max_element();
             reduced += usize::from(params.texels_per_metre > most);
@@ -198,7 +198,7 @@ impl Charts {
                 local: chart.local.iter().map(|corners| corners.map(|p| p * stretch)).collect(),
                 collapsed: axes.map(|axis| axis.collapsed),
                 size: axes.map(|axis| axis.count),
-                area: chart.area,
+                texel: chart.area / self.count(index, scale / finer),
                 at: Placement::default(),
             });
         }

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 /// The number of a slot without a texel.
 const NONE: u32 = u32::MAX;
 
-/// Texels around one, along each axis, that tell the noise of its rays: twenty-five know it to a seventh or better, and a shadow's
-/// edge is not wider.
+/// Texels around one, along each axis, that tell the noise of its rays: twenty-five know it to a seventh, the nine of a
+/// corner to a quarter, and a shadow's edge is not wider.
 const AROUND: u32 = 2;
 
 /// Charts of fewer texels than this ask those that come before and after them, up to so many texels away: most are parts of one thing.
@@ -73,13 +73,9 @@ impl Atlas {
         out
     }
 
-    /// Surface that each of `texels` stands for, m², those of one chart alike.
+    /// Surface that each of `texels` stands for, about, m²: those of one chart alike, up to its border.
     pub fn areas(&self, texels: &[Texel]) -> Vec<f64> {
-        let area = |texel: &Texel| {
-            let chart = &self.charts[self.triangle_chart[texel.triangle as usize] as usize];
-            chart.area / (f64::from(chart.size[0]) * f64::from(chart.size[1]))
-        };
-        texels.iter().map(area).collect()
+        texels.iter().map(|t| self.charts[self.triangle_chart[t.triangle as usize] as usize].texel).collect()
     }
 
     /// What comes of the slots of each chart of a page, in the order of charts: by row, the number of the texel that is there, if it

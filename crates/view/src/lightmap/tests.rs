@@ -482,12 +482,21 @@ fn noise_is_told_by_texels_around() {
         let low = DVec3::new(4.0 + 0.1 * f64::from(i), 0.0, 0.0);
         mesh.add_box(1 + i, low, low + DVec3::splat(0.02), 0.0);
     }
-    let charts = Charts::new(&mesh.input(), &UnwrapParams::default()).unwrap();
-    let atlas = charts.pack(&UnwrapParams::default()).unwrap();
+    let atlas_of = |mesh: &Mesh| {
+        let charts = Charts::new(&mesh.input(), &UnwrapParams::default()).unwrap();
+        charts.pack(&UnwrapParams::default()).unwrap()
+    };
+    let atlas = atlas_of(&mesh);
     let texels = atlas.texels(0);
     let area: f64 = atlas.areas(&texels).iter().sum();
     let whole = 6.0 * (4.0 + 40.0 * 0.0004);
     assert!((area / whole - 1.0).abs() < 1e-9, "{area} of {whole}");
+    // And of what is no rectangle.
+    let mut corner = Mesh::default();
+    corner.add(0, &[DVec3::ZERO, 3.0 * DVec3::X, 3.0 * DVec3::Y], &[[0, 1, 2]]);
+    let triangle = atlas_of(&corner);
+    let area: f64 = triangle.areas(&triangle.texels(0)).iter().sum();
+    assert!((area / 4.5 - 1.0).abs() < 0.05, "{area}");
     let draw = |i: u32, k: u32| f64::from(unit(hash(hash(i) ^ k)));
     let normal = |i| (0..12).map(|k| draw(i, k)).sum::<f64>() - 6.0;
     let size = |texel: &Texel| if texel.triangle < 12 { 1.0 } else { 8.0 };
