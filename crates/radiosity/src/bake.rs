@@ -146,7 +146,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut begun = start;
     let stages = Stages::default();
     let paced = Paced::new(monitor, &options.after);
-    let monitor: &dyn Monitor = &paced;
+    let monitor: &dyn Monitor = &paced.monitor;
     let solve = suited(tracer, options);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
     monitor.round(1, options.rounds + 1);

@@ -3,7 +3,7 @@
 use crate::Solution;
 use radiosity_transport::Progress;
 use serde::Serialize;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Sees the stages of a run; may stop it.
@@ -91,13 +91,23 @@ impl Progress for Begin<'_> {
 /// ```
 pub struct Timed<'a> {
     monitor: &'a dyn Monitor,
-    deadline: Instant,
+    end: Mutex<Option<Instant>>,
 }
 
 impl<'a> Timed<'a> {
     /// So long from now on.
     pub fn new(monitor: &'a dyn Monitor, limit: std::time::Duration) -> Timed<'a> {
-        Timed { monitor, deadline: Instant::now() + limit }
+        Timed { monitor, end: Mutex::new(Some(Instant::now() + limit)) }
+    }
+
+    /// As long as the monitor allows, until another end is set.
+    pub(crate) fn unlimited(monitor: &'a dyn Monitor) -> Timed<'a> {
+        Timed { monitor, end: Mutex::new(None) }
+    }
+
+    /// Sets when time ends, no later than the monitor allows.
+    pub(crate) fn set_end(&self, end: Instant) {
+        *self.end.lock().unwrap_or_else(PoisonError::into_inner) = Some(end);
     }
 }
 
@@ -127,7 +137,8 @@ impl Monitor for Timed<'_> {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        Some(self.monitor.deadline().map_or(self.deadline, |deadline| deadline.min(self.deadline)))
+        let end = *self.end.lock().unwrap_or_else(PoisonError::into_inner);
+        self.monitor.deadline().into_iter().chain(end).min()
     }
 }
 

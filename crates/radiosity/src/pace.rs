@@ -7,9 +7,7 @@
 //!
 //! What is here are functions of seconds that were measured and seconds that are left: without a deadline none of them is asked.
 
-use crate::Solution;
-use crate::monitor::Monitor;
-use std::sync::{Mutex, PoisonError};
+use crate::monitor::{Monitor, Timed};
 use std::time::{Duration, Instant};
 
 /// Part of the time left that the work is planned to fill: small parts are timed to some ten percent.
@@ -138,64 +136,33 @@ impl After {
     }
 }
 
-/// A monitor whose time ends earlier, so that what is to come has its own.
+/// A time that ends earlier than the whole, so that what is to come has its own.
 pub(crate) struct Paced<'a> {
-    monitor: &'a dyn Monitor,
+    /// Watches what comes before that.
+    pub monitor: Timed<'a>,
     total: f64,
-    deadline: Mutex<Option<Instant>>,
+    deadline: Option<Instant>,
 }
 
 impl<'a> Paced<'a> {
     pub fn new(monitor: &'a dyn Monitor, after: &After) -> Paced<'a> {
-        let paced =
-            Paced { monitor, total: left(monitor).unwrap_or(f64::INFINITY), deadline: Mutex::new(monitor.deadline()) };
+        let (total, deadline) = (left(monitor).unwrap_or(f64::INFINITY), monitor.deadline());
+        let paced = Paced { monitor: Timed::unlimited(monitor), total, deadline };
         paced.keep(if after.is_nothing() { 0.0 } else { f64::INFINITY });
         paced
     }
 
     /// Keeps time for what takes so many seconds if nothing is spared.
     pub fn keep(&self, full: f64) {
-        let Some(deadline) = self.monitor.deadline() else { return };
+        let Some(deadline) = self.deadline else { return };
         let kept = Duration::from_secs_f64(kept(self.total, full));
-        *self.deadline.lock().unwrap_or_else(PoisonError::into_inner) =
-            Some(deadline.checked_sub(kept).unwrap_or(deadline));
-    }
-}
-
-impl Monitor for Paced<'_> {
-    fn round(&self, round: usize, most: usize) {
-        self.monitor.round(round, most);
-    }
-
-    fn stage(&self, name: &str) {
-        self.monitor.stage(name);
-    }
-
-    fn step(&self, done: usize, total: usize) -> bool {
-        self.monitor.step(done, total)
-    }
-
-    fn note(&self, text: &str) {
-        self.monitor.note(text);
-    }
-
-    fn warn(&self, text: &str) {
-        self.monitor.warn(text);
-    }
-
-    fn solved(&self, solution: &Solution) {
-        self.monitor.solved(solution);
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        *self.deadline.lock().unwrap_or_else(PoisonError::into_inner)
+        self.monitor.set_end(deadline.checked_sub(kept).unwrap_or(deadline));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Timed;
 
     /// A machine whose clock is known: seconds of work on so many items.
     struct Machine {
@@ -272,14 +239,15 @@ mod tests {
         let after = After { pixels: 1000, points: 1000 };
         let free = Paced::new(&(), &after);
         free.keep(1.0);
-        assert!(free.deadline().is_none() && left(&free).is_none());
+        assert!(free.monitor.deadline().is_none() && left(&free.monitor).is_none());
         let timed = Timed::new(&(), Duration::from_secs(1000));
         let paced = Paced::new(&timed, &after);
-        let before = |paced: &Paced| timed.deadline().zip(paced.deadline()).map(|(end, own)| (end - own).as_secs_f64());
+        let before =
+            |paced: &Paced| timed.deadline().zip(paced.monitor.deadline()).map(|(end, own)| (end - own).as_secs_f64());
         assert!(before(&paced).is_some_and(|kept| kept > 590.0 && kept <= 600.0));
         paced.keep(85.0);
         assert!(before(&paced).is_some_and(|kept| (kept - 100.0).abs() < 0.1));
-        assert_eq!(Paced::new(&timed, &After::default()).deadline(), timed.deadline());
+        assert_eq!(Paced::new(&timed, &After::default()).monitor.deadline(), timed.deadline());
     }
 
     /// Parts that are timed are spread over all items, and few beside them.
