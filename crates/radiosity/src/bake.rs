@@ -205,7 +205,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             rays *= 2;
         }
         let Reading { gather, shadowing: lit, light } = reading;
-        rounds.push(Round::new(&solution, gather, &lit, &audit, start));
+        rounds.push(Round::new(&solution, [gather, lit.rays as usize], &audit, start));
         monitor.note(&rounds[rounds.len() - 1].to_string());
         let achieved = audit.upper <= options.error;
         // More rounds only while there is something to gain, and memory and leave to gain it with.

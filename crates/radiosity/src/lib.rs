@@ -13,6 +13,7 @@
 //! assert!(brightest > 0.0);
 //! ```
 
+mod allocation;
 pub mod answer;
 pub mod bake;
 mod canvas;
@@ -32,6 +33,7 @@ mod mean_path;
 pub mod measure;
 mod monitor;
 mod pace;
+mod points;
 mod preview;
 pub mod render;
 pub mod session;

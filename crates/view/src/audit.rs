@@ -81,8 +81,9 @@ pub struct Auditor<'a> {
 impl<'a> Auditor<'a> {
     /// An auditor of places that are spread evenly by area. `light` is the irradiance expected at each, 0 where nothing is known.
     /// Bright places get more paths: the variance of (h − a)(h − b) is about σ⁴/n², σ being the noise of one of n paths, and is
-    /// least, over all places, with n ∝ σ^(4/3); and σ is about in proportion to light. Whatever is expected, estimates are
-    /// unbiased. Different seeds are independent.
+    /// least, over all places, with n ∝ σ^(4/3); and σ goes with light to the power 0.42 in a furnished office, 0.21 in the Cornell
+    /// box. By the root of light it takes 0.86 and 1.01 times the paths that it takes with as many everywhere; by its power 4/3, 1.31 and 1.49 times.
+    /// Whatever is expected, estimates are unbiased. Different seeds are independent.
     pub fn new(tracer: &'a Tracer<'a>, places: Vec<Place>, light: &[Bands], seed: u64) -> Auditor<'a> {
         assert_eq!(places.len(), light.len());
         let light: Vec<f64> = light.iter().map(|&e| f64::from(luminance(e))).collect();
@@ -90,7 +91,7 @@ impl<'a> Auditor<'a> {
         let mean = light.iter().sum::<f64>() / known.max(1) as f64;
         let [least, most] = DOUBLINGS.map(f64::from);
         let doublings = |e: &f64| match *e > 0.0 {
-            true => (4.0 / 3.0 * (e / mean).log2()).round().clamp(least, most) as i32,
+            true => (0.5 * (e / mean).log2()).round().clamp(least, most) as i32,
             false => 0,
         };
         let estimates = vec![[0.0; 2]; places.len()];

@@ -63,7 +63,7 @@ pub struct Pooled {
 
 impl Pooled {
     /// A place that shares with no other.
-    pub(crate) fn alone(light: Bands, noise: f32) -> Pooled {
+    pub fn alone(light: Bands, noise: f32) -> Pooled {
         Pooled { light, own: 1.0, noise, spread: noise.abs() }
     }
 }

@@ -1,0 +1,161 @@
+//! Optimal allocation: places that ask for more rays get more.
+//!
+//! Of n rays a place keeps the variance s² ∝ 1/n^p. What counts is Σ A s² over places of areas A, and the least Σ n
+//! for it has n in proportion to (A s²)^(1/(1 + p)) (Neyman 1934, where p is 1). s² is what two halves of the first rays say, and
+//! those of places that are likely to be as noisy.
+//!
+//! First rays are kept beside those that they ask for. Where they missed what is bright and small all around, none are asked
+//! for: an audit, which knows nothing of this, tells how much that is.
+
+use crate::Error;
+use radiosity_scene::{Bands, luminance};
+use std::collections::BTreeMap;
+
+/// Doublings of the rays at a time at most: what is noisy after thirty-two times as many is a place with a lamp in its face.
+pub(crate) const MOST_DOUBLINGS: u32 = 5;
+
+/// What rays found so far.
+#[derive(Default)]
+pub(crate) struct Found {
+    /// Light as either half of the rays tells it, lx per band.
+    halves: Vec<[Bands; 2]>,
+    /// Standard error of each one's own light by what is known of places like it, lx.
+    pub noise: Vec<f32>,
+    pub rays: Vec<u32>,
+}
+
+impl Found {
+    /// Two halves, of so many rays together. `evened` makes standard errors, lx, of the light and what halves differ by from it.
+    pub fn new(halves: Vec<[Bands; 2]>, rays: u32, evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>) -> Found {
+        let mut found = Found { rays: vec![rays; halves.len()], noise: Vec::new(), halves };
+        let apart: Vec<f32> = (0..found.halves.len()).map(|i| found.apart(i)).collect();
+        found.noise = evened(&found.light(), &apart);
+        found
+    }
+
+    /// The mean of the halves of each, lx per band.
+    pub fn light(&self) -> Vec<Bands> {
+        self.halves.iter().map(mean).collect()
+    }
+
+    /// What halves differ by from their mean, lx.
+    pub fn apart(&self, i: usize) -> f32 {
+        let [a, b] = self.halves[i];
+        0.5 * luminance(std::array::from_fn(|k| (a[k] - b[k]).abs()))
+    }
+
+    /// Sends more rays from the places that are to have more, as many times as many, up to 2^[`MOST_DOUBLINGS`] ([`curb`]).
+    pub fn grow(
+        &mut self,
+        (times, power): (&[f64], f64),
+        mut send: impl FnMut(&[usize], u32) -> Result<Vec<[Bands; 2]>, Error>,
+    ) -> Result<(), Error> {
+        let doublings = |i: usize| (times[i].log2().round() as u32).min(MOST_DOUBLINGS);
+        let mut groups: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
+        for i in (0..times.len()).filter(|i| doublings(*i) > 0) {
+            groups.entry((doublings(i), self.rays[i])).or_default().push(i);
+        }
+        for ((doubled, had), own) in groups {
+            let (all, more) = (had << doubled, (had << doubled) - had);
+            let part = more as f32 / all as f32;
+            for (&i, new) in own.iter().zip(send(&own, more)?) {
+                for (half, new) in self.halves[i].iter_mut().zip(new) {
+                    *half = std::array::from_fn(|k| half[k] + part * (new[k] - half[k]));
+                }
+                self.noise[i] *= 2f64.powf(-0.5 * power * f64::from(doubled)) as f32;
+                self.rays[i] = all;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn mean([a, b]: &[Bands; 2]) -> Bands {
+    std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+}
+
+/// Lets rays grow to so many times as many in the mean at most, and nowhere to more than 2^[`MOST_DOUBLINGS`].
+pub(crate) fn curb(times: &mut [f64], most: Option<f64>) {
+    times.iter_mut().for_each(|t| *t = t.min(f64::from(1 << MOST_DOUBLINGS)));
+    let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
+    let Some(most) = most.filter(|most| mean > *most) else { return };
+    let part = (most - 1.0).max(0.0) / (mean - 1.0);
+    times.iter_mut().for_each(|t| *t = 1.0 + part * (*t - 1.0));
+}
+
+/// How many times as many rays each place is to have, so that the root mean square of `noise` over `area` becomes `target`, lx, with the
+/// fewest rays, and that of none is more than its ceiling, lx.
+pub(crate) fn growth(noise: &[f32], area: &[f64], ceilings: &[f64], target: f64, power: f64) -> Vec<f64> {
+    let key: Vec<f64> =
+        noise.iter().zip(area).map(|(s, a)| (a * f64::from(*s).powi(2)).powf(1.0 / (1.0 + power))).collect();
+    // With n in proportion to the key of those that grow, Σ A s² is νᵖ Σ key over these and Σ key^(1 + p) over the others, and
+    // those grow whose key is above ν.
+    let allowed = target.powi(2) * area.iter().sum::<f64>();
+    let mut order: Vec<usize> = (0..key.len()).collect();
+    order.sort_unstable_by(|&i, &j| key[j].total_cmp(&key[i]).then(i.cmp(&j)));
+    let mut rest: f64 = key.iter().map(|k| k.powf(1.0 + power)).sum();
+    let (mut grown, mut limit) = (0.0, if rest <= allowed { f64::INFINITY } else { 0.0 });
+    for i in order {
+        if key[i] <= limit {
+            break;
+        }
+        rest -= key[i].powf(1.0 + power);
+        grown += key[i];
+        limit = ((allowed - rest).max(0.0) / grown).powf(1.0 / power);
+    }
+    let own = |i: usize| (key[i] / limit).max((f64::from(noise[i]) / ceilings[i]).powf(2.0 / power)).max(1.0);
+    (0..key.len()).map(own).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use radiosity_trace::sampling::{hash, unit};
+
+    /// Places of all sizes, most of them quiet.
+    fn some() -> (Vec<f32>, Vec<f64>) {
+        let draw = |i: u32, k: u32| unit(hash(hash(i) ^ k));
+        let noise = |i| draw(i, 1) * if draw(i, 2) < 0.05 { 20.0 } else { 1.0 };
+        ((0..4000).map(noise).collect(), (0..4000).map(|i| 0.1 + f64::from(draw(i, 3))).collect())
+    }
+
+    fn left(noise: &[f32], area: &[f64], times: &[f64], power: f64) -> f64 {
+        let square = |i: usize| area[i] * f64::from(noise[i]).powi(2) / times[i].powf(power);
+        ((0..times.len()).map(square).sum::<f64>() / area.iter().sum::<f64>()).sqrt()
+    }
+
+    #[test]
+    fn noise_falls_to_what_is_asked_with_fewer_rays_than_all_alike_would_take() {
+        let (noise, area) = some();
+        let none = vec![f64::INFINITY; noise.len()];
+        for power in [1.0, 1.4] {
+            let first = left(&noise, &area, &vec![1.0; noise.len()], power);
+            for part in [0.7, 0.3, 0.1] {
+                let times = growth(&noise, &area, &none, part * first, power);
+                assert!(times.iter().all(|t| *t >= 1.0));
+                assert!((left(&noise, &area, &times, power) / (part * first) - 1.0).abs() < 1e-6);
+                let alike = f64::powf(part, -2.0 / power) * noise.len() as f64;
+                assert!(times.iter().sum::<f64>() < 0.7 * alike, "{part}: {} of {alike}", times.iter().sum::<f64>());
+            }
+        }
+    }
+
+    #[test]
+    fn quiet_places_grow_only_where_noise_is_seen() {
+        let (noise, area) = some();
+        let ceilings: Vec<f64> = (0..noise.len()).map(|i| if i % 2 == 0 { 1.0 } else { f64::INFINITY }).collect();
+        let times = growth(&noise, &area, &ceilings, 100.0, 1.0);
+        for (i, times) in times.iter().enumerate() {
+            let is_seen = i % 2 == 0 && noise[i] > 1.0;
+            assert!(if is_seen { (f64::from(noise[i]).powi(2) - times).abs() < 1e-3 } else { *times == 1.0 });
+        }
+        // What a deadline allows is shared by those that grow.
+        let mut curbed = times.clone();
+        curb(&mut curbed, Some(1.2));
+        let mean = curbed.iter().sum::<f64>() / curbed.len() as f64;
+        assert!((mean - 1.2).abs() < 1e-9 && curbed.iter().zip(&times).all(|(c, t)| *c >= 1.0 && c <= t), "{mean}");
+        // In the dark nothing is asked for.
+        let dark = growth(&[0.0; 3], &[1.0; 3], &[0.0; 3], 0.0, 1.0);
+        assert_eq!(dark, [1.0; 3]);
+    }
+}
