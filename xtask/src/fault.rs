@@ -17,6 +17,8 @@ pub enum Fault {
     TooLarge(u64),
     #[error("viewer: {0}")]
     Viewer(String),
+    #[error("bench: {0}")]
+    Bench(String),
     #[error("ci: {step} FAILED after {seconds:.1} s\n{what}")]
     Check { step: &'static str, seconds: f64, what: String },
 }

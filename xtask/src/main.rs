@@ -1,5 +1,6 @@
 //! Workspace tasks, run as `cargo xtask VERB`.
 
+mod bench;
 mod ci;
 mod fault;
 mod glb;
@@ -16,6 +17,7 @@ const USAGE: &str = "\
 Usage: cargo xtask VERB
 
   ci                                      run every check: format, import rule, licences, catalogue, lints, tests, docs
+  bench FOLDER [-o FOLDER]                error against time and error maps of all scenes in a folder whose light is known
   showcase [-o FILE]                      write the furnished living room (default out/showcase.glb)
   scenes building [--rooms N] -o FILE     write a closed building of N rooms joined by doors (default 16)
   scenes soup [--triangles N] -o FILE     write a closed room filled with small boxes (default 10000)
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match arguments.split_first() {
         Some((&"ci", rest)) => ci::command(rest),
+        Some((&"bench", rest)) => bench::command(rest),
         Some((&"showcase", rest)) => showcase::command(rest),
         Some((&"scenes", rest)) => scenes::command(rest),
         Some((&"viewer", rest)) => viewer::command(rest),
