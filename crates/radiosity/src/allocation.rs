@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 /// Doublings of the rays at a time at most: what is noisy after thirty-two times as many is a place with a lamp in its face.
 pub(crate) const MOST_DOUBLINGS: u32 = 5;
 
+/// Most rays of a place: some seconds.
+const MOST_RAYS: u32 = 1 << 22;
+
 /// What rays found so far.
 #[derive(Default)]
 pub(crate) struct Found {
@@ -50,7 +53,8 @@ impl Found {
         (times, power): (&[f64], f64),
         mut send: impl FnMut(&[usize], u32) -> Result<Vec<[Bands; 2]>, Error>,
     ) -> Result<(), Error> {
-        let doublings = |i: usize| (times[i].log2().round() as u32).min(MOST_DOUBLINGS);
+        let possible = |i: usize| (MOST_RAYS / self.rays[i].max(1)).checked_ilog2().unwrap_or(0);
+        let doublings = |i: usize| (times[i].log2().round() as u32).min(MOST_DOUBLINGS).min(possible(i));
         let mut groups: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
         for i in (0..times.len()).filter(|i| doublings(*i) > 0) {
             groups.entry((doublings(i), self.rays[i])).or_default().push(i);

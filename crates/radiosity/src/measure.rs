@@ -1,8 +1,9 @@
 //! Illuminance at points, to an asked error.
 //!
 //! A coarse solution supplies the radiosities that a final gather at each point looks up; errors of single elements
-//! average out over its rays. The referee watches a part of the points; rays are doubled until its upper bound meets
-//! the target, or until the budget ends, and the report says which.
+//! average out over its rays. The referee watches a part of the points; what is wrong beyond the noise of the
+//! points, which they tell by themselves, is the solution's. Either is mended until the upper bound meets the target, or until the
+//! budget ends, and the report says which.
 
 use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::points::{Points, Rays};
@@ -23,7 +24,7 @@ pub struct MeasureOptions {
     pub solve: SolveOptions,
     /// Points that the referee examines.
     pub audit_points: usize,
-    /// Rounds of refinement, each with twice the rays of the one before.
+    /// Rounds of refinement at most.
     pub rounds: usize,
     /// Seed of the audit.
     pub seed: u64,
@@ -69,7 +70,7 @@ const LEAST_WATCHED: usize = 64;
 /// Up to how many times as many paths go to each point where points are few.
 const CLOSER: usize = 16;
 
-/// How much longer a round takes than the one before, about: twice the rays, and more of them find something.
+/// How much longer a round takes than the one before, about: with twice the rays, more of them find something.
 pub(crate) const ROUND_GROWTH: f64 = 2.5;
 
 /// First gather rays and shadow rays of each point at 1 %: a sixth of what they need in a furnished office in the end. With half as many the others
@@ -89,9 +90,9 @@ pub struct Round {
     pub elements: usize,
     /// Rays per cell; the elements of a divided cell share them.
     pub rays: usize,
-    /// Gather rays per point; zero where the field was interpolated.
+    /// Gather rays per point, on average; zero where the field was interpolated.
     pub gather: usize,
-    /// Shadow rays at each point, over all lights.
+    /// Shadow rays at each point, over all lights, on average.
     pub shadow_rays: u32,
     /// Estimated error.
     pub error: f64,
