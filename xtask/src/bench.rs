@@ -24,7 +24,7 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
     std::fs::create_dir_all(&to).map_err(Fault::at(&to))?;
     let mut said = String::new();
     for (folder, scene) in &known {
-        let name = scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let (curve, errors) = (to.join(format!("curve-{name}.svg")), to.join(format!("errors-{name}.png")));
         said += &run("curves", &[folder.as_os_str(), curve.as_os_str()])?;
         said += &run("error_maps", &[scene.as_os_str(), errors.as_os_str()])?;
@@ -47,7 +47,8 @@ fn known_in(scenes: &Path) -> Result<Vec<(PathBuf, PathBuf)>, Fault> {
     for folder in entries(scenes)?.into_iter().filter(|path| path.is_dir()) {
         if KNOWN.iter().all(|name| folder.join(name).is_file()) {
             let scene = entries(&folder)?.iter().find(is_scene).cloned();
-            known.extend(scene.map(|scene| (folder, scene)));
+            let none = || Fault::Bench(format!("{}: there is no scene (.obj, .gltf, .glb) in it", folder.display()));
+            known.push((folder.clone(), scene.ok_or_else(none)?));
         }
     }
     Ok(known)
@@ -78,14 +79,15 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, "").unwrap();
         };
-        for path in
-            ["b/b.glb", "b/points.csv", "b/reference.csv", "a/a.obj", "a/points.csv", "c/points.csv", "c/reference.csv"]
-        {
+        for path in ["b/b.glb", "b/points.csv", "b/reference.csv", "a/a.obj", "a/points.csv", "c/reference.csv"] {
             file(path);
         }
-        let known = known_in(&root).unwrap();
+        let known = known_in(&root);
+        assert_eq!(known.unwrap(), [(root.join("b"), root.join("b/b.glb"))]);
+        file("d/points.csv");
+        file("d/reference.csv");
+        assert!(matches!(known_in(&root), Err(Fault::Bench(_))), "no scene in d");
         std::fs::remove_dir_all(&root).unwrap();
-        assert_eq!(known, [(root.join("b"), root.join("b/b.glb"))]);
         assert!(matches!(command(&[]), Err(Fault::Usage(_))));
         assert!(matches!(command(&[root.to_str().unwrap()]), Err(Fault::File { .. })));
     }

@@ -45,6 +45,9 @@ fn run(scene: &Path, to: &Path, percent: f64, paths: u32) -> Result<(), Failure>
     let camera = loaded.scene.cameras.first().cloned().unwrap_or_else(|| place_camera(&tracer, Some(aspect)));
     let rays = ViewRays::sampled(&tracer, &camera, (width, height), 1);
     let places: Vec<Place> = rays.seen.iter().map(|seen| seen.place).collect();
+    if places.is_empty() {
+        return Err("the camera sees no surface".into());
+    }
     let points: Vec<_> = places.iter().map(|place| (place.point, place.normal)).collect();
 
     let options = MeasureOptions { error: percent / 100.0, ..MeasureOptions::default() };
@@ -104,6 +107,7 @@ fn main() -> Result<(), Failure> {
         println!("error_maps: name a scene and a picture (.png) to write");
         return Ok(());
     };
-    let number = |k: usize, usual: f64| rest.get(k).map_or(Ok(usual), |word| word.parse::<f64>());
-    run(Path::new(scene), Path::new(to), number(0, 2.0)?, number(1, 4096.0)? as u32)
+    let percent = rest.first().map_or(Ok(2.0), |word| word.parse())?;
+    let paths = rest.get(1).map_or(Ok(4096.try_into()?), |word| word.parse::<std::num::NonZero<u32>>())?;
+    run(Path::new(scene), Path::new(to), percent, paths.get())
 }

@@ -77,6 +77,9 @@ pub(crate) const ROUND_GROWTH: f64 = 2.5;
 /// are sent with less knowledge, and as much noise takes as much time.
 const FIRST_RAYS: [f64; 2] = [256.0, 128.0];
 
+/// Most first rays.
+const MOST_FIRST: usize = 4096;
+
 /// Fewest gather rays and shadow rays that an answer is given with.
 const FEWEST: Rays = [32, 32];
 
@@ -173,12 +176,14 @@ pub fn measure(
     solve.suit_method();
     solve.fit(tracer);
     // Within a time limit one comes to what is needed step by step.
-    let first = match monitor.deadline() {
+    let mut first = match monitor.deadline() {
         Some(_) => FEWEST,
-        None => std::array::from_fn(|k| rays_for(options.error, FIRST_RAYS[k], FEWEST[k], 4096)),
+        None => std::array::from_fn(|k| rays_for(options.error, FIRST_RAYS[k], FEWEST[k], MOST_FIRST)),
     };
     monitor.round(1, options.rounds + 1);
+    let mut solving = Instant::now();
     let mut solution = Solution::new(tracer, &solve, monitor)?;
+    let mut solution_takes = solving.elapsed().as_secs_f64();
     // Every further one is told how large its elements are.
     solve.element_size = Some(solution.element_size);
 
@@ -197,15 +202,19 @@ pub fn measure(
     let most_paths = most_paths(options.error).saturating_mul(closer);
     let (mut rounds, mut solved) = (Vec::new(), 0);
     let mut light = Points::new(&solution, &places, first, monitor)?;
-    let size = root_mean_square(&light.irradiance());
-    let mut aim = NOISE * options.error * size;
+    let mut noise_asked = NOISE * options.error;
+    let mut best: Option<Measurement> = None;
     loop {
         let begun = Instant::now();
+        // Where the first rays found no light they tell no noise either.
+        let size = root_mean_square(&light.irradiance()).max(f64::from(f32::MIN_POSITIVE));
         // What is shared is less noisy than its rays, and the less so the more there are: one step does not do. Within a time limit steps
         // are short.
         let most = monitor.deadline().map(|_| 2.0);
-        while light.noise() > ENOUGH * aim && has_time(monitor, 1.5 * light.seconds) {
-            if !light.grow(&solution, aim, most, monitor)? {
+        let mut lacks_time = false;
+        while light.noise() > ENOUGH * noise_asked * size {
+            lacks_time = !has_time(monitor, 1.5 * light.seconds);
+            if lacks_time || !light.grow(&solution, noise_asked * size, most, monitor)? {
                 break;
             }
         }
@@ -218,45 +227,64 @@ pub fn measure(
         let audit = certify_unless(&mut auditor, judge, target, most_paths, &stages, monitor)?;
         rounds.push(Round::new(&solution, light.rays(), &audit, start));
         monitor.note(&rounds[rounds.len() - 1].to_string());
-        let achieved = audit.upper <= options.error;
 
         let plan = Plan::after(audit.error, light.noise() / size, options.error);
-        let next = if plan.solves_again {
-            finer(&solve, options.solve.element_size.is_some() || solved % 2 == 1)
-        } else {
-            solve
+        let answer = Measurement {
+            irradiance,
+            achieved: audit.upper <= options.error,
+            audit,
+            out_of_time: false,
+            rounds: Vec::new(),
+            stages: Stages::default(),
+            residual: solution.info.residual.clone(),
+            bound: solution.info.bound.clone(),
         };
-        let fits = Solution::fits(tracer, &next);
-        let is_last = achieved || rounds.len() > options.rounds || places.is_empty() || !fits || is_stalled(&rounds);
-        let takes = ROUND_GROWTH * begun.elapsed().as_secs_f64();
-        let out_of_time = !is_last && !has_time(monitor, takes);
+        // A time limit may have left too little for the points of another solution.
+        let answer = match best.take() {
+            Some(best) if monitor.deadline().is_some() && best.audit.upper < answer.audit.upper => best,
+            _ => answer,
+        };
+        let alone = options.solve.element_size.is_some() || solved % 2 == 1;
+        let next = if plan.solves_again { finer(&solve, solution.rays(), alone) } else { solve };
+        let is_last = answer.achieved
+            || rounds.len() > options.rounds
+            || places.is_empty()
+            || is_stalled(&rounds)
+            || !Solution::fits(tracer, &next);
+        let takes = match plan.solves_again {
+            true => ROUND_GROWTH * (solution_takes + light.seconds),
+            false => light.seconds.max(begun.elapsed().as_secs_f64()),
+        };
+        let out_of_time = !is_last && (lacks_time || !has_time(monitor, takes));
         if is_last || out_of_time {
             stages.absorb(&solution.stages);
-            return Ok(Measurement {
-                irradiance,
-                audit,
-                achieved,
-                out_of_time: !achieved && (out_of_time || is_over(monitor)),
-                rounds,
-                stages,
-                residual: solution.info.residual.clone(),
-                bound: solution.info.bound.clone(),
-            });
+            let out_of_time = !answer.achieved && (out_of_time || is_over(monitor));
+            return Ok(Measurement { out_of_time, rounds, stages, ..answer });
         }
         monitor.round(rounds.len() + 1, options.rounds + 1);
-        aim = plan.noise * size;
+        noise_asked = plan.noise;
         if plan.solves_again {
-            solved += 1;
-            if next.element_size == solve.element_size {
-                solution.refine(next.rays, monitor)?;
+            solving = Instant::now();
+            stages.absorb(&solution.stages);
+            solution.stages = Stages::default();
+            let again = if next.element_size == solve.element_size {
+                solution.refine(next.rays, monitor).map(|()| solution)
             } else {
-                stages.absorb(&solution.stages);
                 drop(solution);
-                solution = Solution::new(tracer, &next, monitor)?;
-            }
-            solve = next;
-            light.gather(&solution, first, monitor)?;
+                Solution::new(tracer, &next, monitor)
+            };
+            solution = match again {
+                // How much room elements take is known once they are made.
+                Err(Error::Memory { .. }) => return Ok(Measurement { rounds, stages, ..answer }),
+                again => again?,
+            };
+            solution_takes = solving.elapsed().as_secs_f64();
+            (solve, solved) = (next, solved + 1);
+            // What few rays found may have missed much, and they may tell little noise: twice as many to begin with.
+            first = first.map(|rays| (2 * rays).min(MOST_FIRST));
+            light.begin(&solution, first, monitor)?;
         }
+        best = Some(answer);
     }
 }
 
@@ -283,10 +311,10 @@ impl Plan {
     }
 }
 
-/// How to solve for less error than a solution has: with more rays, and with smaller elements and more places on each that look at
-/// lights, unless with rays `alone`.
-fn finer(solve: &SolveOptions, alone: bool) -> SolveOptions {
-    let mut next = SolveOptions { rays: 2 * solve.rays, ..*solve };
+/// How to solve for less error than a solution with so many rays has: with twice as many, and with smaller elements and more places on
+/// each that look at lights, unless with rays `alone`.
+fn finer(solve: &SolveOptions, rays: usize, alone: bool) -> SolveOptions {
+    let mut next = SolveOptions { rays: 2 * rays, ..*solve };
     if !alone {
         next.element_size = solve.element_size.map(|size| size / std::f64::consts::SQRT_2);
         next.shadowing.places *= 2;

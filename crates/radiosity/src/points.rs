@@ -1,7 +1,7 @@
 //! Light at points: a few rays for each, then more for those whose first ones disagree ([`crate::allocation`]). All that were sent
 //! count, but for gather rays after the solution has changed that they looked up.
 
-use crate::allocation::{Found, curb, growth};
+use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth, mean};
 use crate::{Error, Monitor, Solution};
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
@@ -15,11 +15,10 @@ pub(crate) type Rays = [usize; 2];
 /// Root mean square noise over all points, lx, in what is gathered and in direct light.
 type Noise = [f64; 2];
 
-/// p of gathers and of shadow rays: what 64 to 2,048 of them leave in a furnished office, where variances of gathers fall with
-/// n^1.07, and those of direct light with n^1.5.
-const POWERS: [f64; 2] = [1.0, 1.4];
+/// p of either kind.
+const POWERS: [f64; 2] = [GATHERED_POWER, DIRECT_POWER];
 
-/// Noise of a point relative to its own light at most, over that asked relative to the mean of all; and the part of the mean below which light
+/// Noise of a point relative to its own light at most, over the noise that is asked, relative to the mean; and the part of the mean below which light
 /// counts as if it was as much. In a furnished office at 1 % one place in a hundred is 14 % off so, and 16 % without; with 3 instead of 5 it is
 /// 11 %, and twice 0.05 instead of 0.1 the same, but a quarter to a third more gather rays are sent.
 const VISIBLE: f64 = 5.0;
@@ -57,25 +56,24 @@ impl<'p> Points<'p> {
         let planes = shares.then(|| Planes::new(solution.tracer().mesh, &solution.elements));
         let (direct, gathered, pooled) = Default::default();
         let mut points = Points { places, on, planes, direct, gathered, pooled, sets: 0, seconds: 0.0 };
-        let began = Instant::now();
-        let [_, shadow] = rays;
-        let mut half = || {
-            points.sets += 1;
-            solution.direct_by(places, &shadowing(shadow / 2), points.sets, monitor)
-        };
-        let halves = half()?.into_iter().zip(half()?).map(|(a, b)| [a, b]).collect();
-        points.direct = Found::new(halves, shadow as u32, evened);
-        points.gather(solution, rays, monitor)?;
-        points.seconds = began.elapsed().as_secs_f64();
+        points.begin(solution, rays, monitor)?;
         Ok(points)
     }
 
-    /// Gathers from a solution, as if nothing had been gathered before.
-    pub fn gather(&mut self, solution: &Solution, [rays, _]: Rays, monitor: &dyn Monitor) -> Result<(), Error> {
+    /// Begins anew with another solution: what it leaves to direct light may be something else.
+    pub fn begin(&mut self, solution: &Solution, [gather, shadow]: Rays, monitor: &dyn Monitor) -> Result<(), Error> {
+        let began = Instant::now();
+        let mut half = || {
+            self.sets += 1;
+            solution.direct_by(self.places, &shadowing(shadow / 2), self.sets, monitor)
+        };
+        let halves = half()?.into_iter().zip(half()?).map(|(a, b)| [a, b]);
+        self.direct = Found::of_halves(halves, shadow as u32, evened);
         self.sets += 1;
-        let halves = solution.halves_at(self.places, rays, self.sets, monitor)?;
-        self.gathered = Found::new(halves, rays as u32, evened);
+        let halves = solution.halves_at(self.places, gather, self.sets, monitor)?;
+        self.gathered = Found::of_halves(halves, gather as u32, evened);
         self.share();
+        self.seconds = began.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -88,35 +86,36 @@ impl<'p> Points<'p> {
         most: Option<f64>,
         monitor: &dyn Monitor,
     ) -> Result<bool, Error> {
-        let (began, before) = (Instant::now(), self.rays());
+        let began = Instant::now();
         let [of_gathered, of_direct] = split(self.noise_by_kind(), self.rays(), noise);
         self.sets += 1;
         let (places, set) = (self.places, self.sets);
         let of = |own: &[usize]| -> Vec<Place> { own.iter().map(|i| places[*i]).collect() };
         let alike = vec![1.0; places.len()];
         let light: Vec<f64> = self.irradiance().iter().map(|e| f64::from(luminance(*e))).collect();
-        let mean = light.iter().sum::<f64>() / places.len().max(1) as f64;
-        let ceilings: Vec<f64> = light.iter().map(|e| VISIBLE * noise * (e / mean).max(DARK)).collect();
+        let average = light.iter().sum::<f64>() / places.len().max(1) as f64;
+        let ceilings: Vec<f64> = light.iter().map(|e| VISIBLE * noise * (e / average).max(DARK)).collect();
         let [for_gathered, for_direct] = POWERS;
         let mut times = growth(&self.direct.noise, &alike, &ceilings, of_direct, for_direct);
         curb(&mut times, most);
-        self.direct.grow((&times, for_direct), |own, rays| {
-            let found = solution.direct_by(&of(own), &shadowing(rays as usize), set, monitor)?;
-            Ok(found.into_iter().map(|e| [e; 2]).collect())
+        let more_direct = self.direct.grow((&times, for_direct), |own, rays| {
+            solution.direct_by(&of(own), &shadowing(rays as usize), set, monitor)
         })?;
         let spread: Vec<f32> = self.pooled.iter().map(|p| p.spread).collect();
         let mut times = growth(&spread, &alike, &ceilings, of_gathered, for_gathered);
         curb(&mut times, most);
-        self.gathered
-            .grow((&times, for_gathered), |own, rays| solution.halves_at(&of(own), rays as usize, set, monitor))?;
+        let more_gathered = self.gathered.grow((&times, for_gathered), |own, rays| {
+            let halves = solution.halves_at(&of(own), rays as usize, set, monitor)?;
+            Ok(halves.into_iter().map(mean).collect())
+        })?;
         self.share();
         self.seconds += began.elapsed().as_secs_f64();
-        Ok(self.rays() != before)
+        Ok(more_direct || more_gathered)
     }
 
     /// Has points of a plane share what they gathered, as far as it is smooth.
     fn share(&mut self) {
-        let light = self.gathered.light();
+        let light = &self.gathered.light;
         let finding = |i: usize| {
             let (Place { point, triangle, .. }, side) = (self.places[i], self.on[i]?);
             let noise = self.gathered.noise[i];
@@ -137,7 +136,7 @@ impl<'p> Points<'p> {
     pub fn irradiance(&self) -> Vec<Bands> {
         // What paths find beyond what they look up may be less than nothing.
         let all = |(d, p): (&Bands, &Pooled)| std::array::from_fn(|k| (d[k] + p.light[k]).max(0.0));
-        self.direct.light().iter().zip(&self.pooled).map(all).collect()
+        self.direct.light.iter().zip(&self.pooled).map(all).collect()
     }
 
     /// The noise that is left.
@@ -189,7 +188,8 @@ fn split(now: Noise, rays: Rays, asked: f64) -> Noise {
     variances(low.exp()).map(f64::sqrt)
 }
 
-fn shadowing(rays: usize) -> Shadowing {
+/// That many shadow rays at a point.
+pub(crate) fn shadowing(rays: usize) -> Shadowing {
     Shadowing { places: 1, rays: rays as u32 }
 }
 
@@ -212,8 +212,8 @@ fn evened(light: &[Bands], apart: &[f32]) -> Vec<f32> {
     let mut noise = vec![0.0; light.len()];
     for (rank, &i) in order.iter().enumerate() {
         let (low, high) = (rank.saturating_sub(ALIKE), (rank + ALIKE + 1).min(order.len()));
-        let of_others = (sums[high] - sums[low]) / (high - low) as f64;
-        noise[i] = (0.5 * (square(i) + of_others)).sqrt() as f32;
+        let of_alike = (sums[high] - sums[low]) / (high - low) as f64;
+        noise[i] = (0.5 * (square(i) + of_alike)).sqrt() as f32;
     }
     noise
 }

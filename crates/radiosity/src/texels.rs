@@ -2,16 +2,16 @@
 //! ([`crate::allocation`]): for what is gathered, by what halves differ by after it was shared ([`Atlas::pooled`]). In a furnished office a
 //! twentieth of the texels has two thirds of the squared error, if all have as many rays.
 
-use crate::allocation::{Found, curb, growth};
+use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth, mean};
 use crate::answer::Station;
 use crate::bake::{Baked, gather_rays};
 use crate::judge::{root_mean_square, thinned as thin};
 use crate::measure::rays_for;
 use crate::pace;
+use crate::points::shadowing;
 use crate::{Error, Monitor};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::Shadowing;
 use radiosity_view::Pooled;
 use radiosity_view::lightmap::{Atlas, Texel};
 
@@ -29,10 +29,6 @@ const MOST_SHADOW: usize = 1024;
 /// together, the rest of what solutions may have ([`crate::judge`]) is for what is not noise.
 const GATHERED_NOISE: f64 = 0.5;
 const DIRECT_NOISE: f64 = 0.4;
-
-/// p of gathers and of shadow rays: what 64 to 1,024 of them leave in a furnished office.
-const GATHERED_POWER: f64 = 1.0;
-const DIRECT_POWER: f64 = 1.4;
 
 /// Noise of one texel relative to its own light at most, about, in errors asked. In a furnished office at 2 % twice as much saves a fifteenth of
 /// the gather rays, and two thirds of it take a third more of them.
@@ -77,10 +73,8 @@ pub(crate) fn light(
     let places: Vec<Place> = at.iter().map(|station| station.place).collect();
     let of = |own: &[usize]| -> Vec<Place> { own.iter().map(|i| places[*i]).collect() };
     let evened = |_: &[Bands], apart: &[f32]| sheet.atlas.evened(sheet.page, sheet.texels, apart);
-    let pooled =
-        |found: &Found| sheet.atlas.pooled(sheet.page, sheet.texels, &found.light(), &found.noise, &found.rays);
+    let pooled = |found: &Found| sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.noise, &found.rays);
 
-    let shadowing = |rays: usize| Shadowing { places: 1, rays: rays as u32 };
     let shared = |rays: usize| -> Result<(Option<Found>, Vec<Pooled>), Error> {
         if !gathers {
             let told = |s: &Station| baked.field.at(s.place.triangle as usize, s.uv, s.side);
@@ -88,7 +82,7 @@ pub(crate) fn light(
             return Ok((None, at.iter().map(alone).collect()));
         }
         let halves = solution.halves_at(&places, rays, 0, monitor)?;
-        let gathered = Found::new(halves, rays as u32, evened);
+        let gathered = Found::of_halves(halves, rays as u32, evened);
         let indirect = pooled(&gathered);
         Ok((Some(gathered), indirect))
     };
@@ -101,28 +95,30 @@ pub(crate) fn light(
     let first = gather_rays(error).min(FIRST_GATHERED);
     let shadow = rays_for(error, FIRST_SHADOW, LEAST_SHADOW, MOST_SHADOW);
     let half = |salt| solution.direct_by(&places, &shadowing(shadow / 2), salt, monitor);
-    let halves = half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]).collect();
-    let mut direct = Found::new(halves, shadow as u32, evened);
+    let halves = half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]);
+    let mut direct = Found::of_halves(halves, shadow as u32, evened);
     let (mut gathered, mut indirect) = shared(first)?;
     let area = sheet.atlas.areas(sheet.texels);
-    let mean = root_mean_square(solution);
+    let size = root_mean_square(solution);
     let ceiling =
-        |(d, p): (&Bands, &Pooled)| VISIBLE * error * f64::from(luminance(*d) + luminance(p.light)).max(DARK * mean);
-    let ceilings: Vec<f64> = direct.light().iter().zip(&indirect).map(ceiling).collect();
+        |(d, p): (&Bands, &Pooled)| VISIBLE * error * f64::from(luminance(*d) + luminance(p.light)).max(DARK * size);
+    let ceilings: Vec<f64> = direct.light.iter().zip(&indirect).map(ceiling).collect();
     // What is planned within a deadline are the usual rays, and no more are sent.
     let [most_gathered, most_shadow] = usual_rays(error).map(|rays| pace::left(monitor).map(|_| rays as f64));
-    let mut times = growth(&direct.noise, &area, &ceilings, DIRECT_NOISE * error * mean, DIRECT_POWER);
+    let mut times = growth(&direct.noise, &area, &ceilings, DIRECT_NOISE * error * size, DIRECT_POWER);
     curb(&mut times, most_shadow.map(|most| most / shadow as f64));
     direct.grow((&times, DIRECT_POWER), |own, rays| {
-        let found = solution.direct_by(&of(own), &shadowing(rays as usize), 3, monitor)?;
-        Ok(found.into_iter().map(|e| [e; 2]).collect())
+        solution.direct_by(&of(own), &shadowing(rays as usize), 3, monitor)
     })?;
     if let Some(gathered) = &mut gathered {
         let spread: Vec<f32> = indirect.iter().map(|p| p.spread).collect();
-        let mut times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * mean, GATHERED_POWER);
+        let mut times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * size, GATHERED_POWER);
         curb(&mut times, most_gathered.map(|most| most / first as f64));
-        gathered.grow((&times, GATHERED_POWER), |own, rays| solution.halves_at(&of(own), rays as usize, 1, monitor))?;
+        gathered.grow((&times, GATHERED_POWER), |own, rays| {
+            let halves = solution.halves_at(&of(own), rays as usize, 1, monitor)?;
+            Ok(halves.into_iter().map(mean).collect())
+        })?;
         indirect = pooled(gathered);
     }
-    Ok(TexelLight { direct: direct.light(), indirect })
+    Ok(TexelLight { direct: direct.light, indirect })
 }

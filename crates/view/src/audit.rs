@@ -22,9 +22,8 @@ const ONE_SIDED_95: f64 = 2.0;
 /// Standard errors beyond which an answer is wrong for certain.
 const CERTAIN: f64 = 3.0;
 
-/// Fewest and most paths of a place, relative to `paths`, as powers of two. Without a most, the few places beside a lamp would take
-/// all the time; with half of it they have twice the noise. Fewer in the dark would save a quarter of the time, and leave more errors
-/// there unseen.
+/// Fewest and most paths of a place, relative to `paths`, as powers of two: a sixteenth of the mean light and less, 256 times as much and more. Without a
+/// most, the few places beside a lamp would take all the time.
 const DOUBLINGS: [i32; 2] = [-2, 4];
 
 /// Fewer points than this get no bound: the spread of heavy-tailed products cannot be told from a handful.
@@ -262,7 +261,7 @@ mod tests {
             let mut auditor = Auditor::new(&tracer, places.clone(), &light, 3);
             let paths = |a: &Auditor, k: usize| a.paths_at(k, 256);
             let (bright, dark) = if light[0][0] > 50.0 { (0, 39) } else { (39, 0) };
-            assert_eq!((paths(&auditor, bright), paths(&auditor, dark)), (256 << 2, 256 >> 2));
+            assert_eq!((paths(&auditor, bright), paths(&auditor, dark)), (256 << 1, 256 >> 1));
             assert!(auditor.trace(64, |_| true) && auditor.trace(4096, |_| true));
             auditor.judge(&vec![[1.0; 3]; 40]).mean_illuminance
         });

@@ -60,7 +60,7 @@ impl Default for SolveOptions {
     }
 }
 
-/// Rays per cell below which an answer is of no use.
+/// Rays per cell below which what elements show is of no use; what looks them up can do with fewer.
 pub(crate) const LEAST_RAYS: usize = 32;
 
 /// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
