@@ -1,5 +1,5 @@
 //! Light at points: a few rays for each, then more for those whose first ones disagree ([`crate::allocation`]). All that were sent
-//! count, but for gather rays after the solution has changed that they looked up.
+//! count, until another solution takes the place of the one that they looked up.
 
 use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth, mean};
 use crate::{Error, Monitor, Solution};
@@ -20,7 +20,7 @@ const POWERS: [f64; 2] = [GATHERED_POWER, DIRECT_POWER];
 
 /// Noise of a point relative to its own light at most, over the noise that is asked, relative to the mean; and the part of the mean below which light
 /// counts as if it was as much. In a furnished office at 1 % one place in a hundred is 14 % off so, and 16 % without; with 3 instead of 5 it is
-/// 11 %, and twice 0.05 instead of 0.1 the same, but a quarter to a third more gather rays are sent.
+/// 11 %, with 0.05 instead of 0.1 as well, and either takes a third more time.
 const VISIBLE: f64 = 5.0;
 const DARK: f64 = 0.1;
 
