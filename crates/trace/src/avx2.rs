@@ -7,8 +7,7 @@
 //! come), fetching the boxes met ahead of their turn (3 % slower, and no faster in a building of a million triangles), boxes
 //! put on the stack by a permutation without branches and in the order of the ray's octant (30 % slower: the processor guesses well),
 //! eight triangles at once in single precision with the exact test for those that pass (no faster), coordinates over directions worked out
-//! once per ray (no faster). Pages of 2 MiB made 4 % more rays a second in that building, and its tree took half as long again to build. Large triangles
-//! split between boxes beforehand made rays in the room visit a tenth fewer nodes, in the building a tenth more.
+//! once per ray (no faster). Pages of 2 MiB made 4 % more rays a second in that building, and its tree took half as long again to build.
 
 use crate::build::MAX_DEPTH;
 use crate::intersect::Prepared;

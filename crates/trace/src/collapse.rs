@@ -27,8 +27,8 @@ pub(crate) type Costs = [f32; WIDTH - 1];
 /// How a subtree of so many triangles hangs below its parent, and what it costs there, given the costs of its children.
 /// `[0]`: children given to the left side when this is a node of its own, 0 where it is a leaf.
 /// `[i - 1]`: children out of i given to the left side, 0 where i − 1 do as well.
-pub(crate) fn choose(count: u32, area: f32, children: Option<[&Costs; 2]>) -> ([u8; WIDTH - 1], Costs) {
-    let blocks = (count as usize).div_ceil(LANES);
+pub(crate) fn choose(count: usize, area: f32, children: Option<[&Costs; 2]>) -> ([u8; WIDTH - 1], Costs) {
+    let blocks = count.div_ceil(LANES);
     let leaf = if blocks <= MAX_BLOCKS { area * BLOCK * blocks as f32 } else { f32::INFINITY };
     let (mut slots, mut costs) = ([0; WIDTH - 1], [leaf; WIDTH - 1]);
     let Some([l, r]) = children else { return (slots, costs) };
@@ -64,23 +64,29 @@ pub(crate) fn collapse<C: Fn(usize) -> [Vec3; 3]>(
 ) -> (Vec<Node>, Vec<Block>) {
     let mut area = vec![0.0; items.len() + 1];
     for (i, item) in items.iter().enumerate() {
-        let [a, b, c] = corners(item.triangle() as usize).map(|p| p.as_dvec3());
-        area[i + 1] = area[i] + (b - a).cross(c - a).length();
+        area[i + 1] = area[i];
+        if !item.is_none() {
+            let [a, b, c] = corners(item.triangle() as usize).map(|p| p.as_dvec3());
+            area[i + 1] += (b - a).cross(c - a).length();
+        }
     }
     let mut wide = Wide { binary, items, corners, area, nodes: Vec::new(), blocks: Vec::new() };
     if !binary.is_empty() {
         wide.nodes.push(Node::EMPTY);
         if binary[0].slots[0] == 0 {
             // A tree of one leaf still gets a node above it.
-            wide.fill(0, &mut [(0, 0)]);
+            wide.fill(0, &mut [(0, 0, items.len())]);
         } else {
             let mut children = Vec::with_capacity(WIDTH);
-            wide.open(0, 0, WIDTH, &mut children);
+            wide.open((0, 0, items.len()), WIDTH, &mut children);
             wide.fill(0, &mut children);
         }
     }
     (wide.nodes, wide.blocks)
 }
+
+/// A binary node, the first of its places for items, and how many these are.
+type Place = (usize, usize, usize);
 
 struct Wide<'a, C> {
     binary: &'a [Binary],
@@ -96,58 +102,62 @@ struct Wide<'a, C> {
 impl<C: Fn(usize) -> [Vec3; 3]> Wide<'_, C> {
     /// Lists what hangs on the wide node above when the binary node at `at`, whose items start at `first`, is
     /// opened and may take `slots` places.
-    fn open(&self, at: usize, first: usize, slots: usize, children: &mut Vec<(usize, usize)>) {
+    fn open(&self, (at, first, room): Place, slots: usize, children: &mut Vec<Place>) {
         let node = &self.binary[at];
         let left = node.left as usize;
         let k = node.slots[if slots == WIDTH { 0 } else { slots - 1 }] as usize;
-        for (at, first, slots) in [(at + 1, first, k), (at + 2 * left, first + left, slots - k)] {
+        for (at, first, room, slots) in
+            [(at + 1, first, left, k), (at + 2 * left, first + left, room - left, slots - k)]
+        {
             // Where fewer slots cost as much, fewer are taken; with one left the subtree stays closed.
             let slots = (2..=slots).rev().find(|&i| self.binary[at].slots[i - 1] != 0);
             match slots {
-                Some(slots) => self.open(at, first, slots, children),
-                None => children.push((at, first)),
+                Some(slots) => self.open((at, first, room), slots, children),
+                None => children.push((at, first, room)),
             }
         }
     }
 
     /// Fills a wide node. Its inner children come to lie next to each other; everything below them follows in order. The largest
     /// come first there: of boxes that a ray enters at the same distance the first is opened first.
-    fn fill(&mut self, index: usize, children: &mut [(usize, usize)]) {
+    fn fill(&mut self, index: usize, children: &mut [Place]) {
         children.sort_by(|&a, &b| self.area_below(a).total_cmp(&self.area_below(b)));
         let mut node = Node::EMPTY;
         let mut below = Vec::new();
-        for (slot, &(at, first)) in children.iter().enumerate().rev() {
+        for (slot, &(at, first, room)) in children.iter().enumerate().rev() {
             let binary = &self.binary[at];
             for axis in 0..3 {
                 node.bounds[axis][slot] = binary.lo[axis];
                 node.bounds[axis + 3][slot] = binary.hi[axis];
             }
             node.child[slot] = if binary.slots[0] == 0 {
-                self.leaf(&self.items[first..first + binary.count as usize])
+                self.leaf(&self.items[first..first + room])
             } else {
                 self.nodes.push(Node::EMPTY);
-                below.push((self.nodes.len() - 1, at, first));
+                below.push((self.nodes.len() - 1, (at, first, room)));
                 Child::node(self.nodes.len() - 1)
             };
         }
         self.nodes[index] = node;
-        for (index, at, first) in below {
+        for (index, place) in below {
             let mut children = Vec::with_capacity(WIDTH);
-            self.open(at, first, WIDTH, &mut children);
+            self.open(place, WIDTH, &mut children);
             self.fill(index, &mut children);
         }
     }
 
     /// Twice the area of the triangles below a binary node.
-    fn area_below(&self, (at, first): (usize, usize)) -> f64 {
-        self.area[first + self.binary[at].count as usize] - self.area[first]
+    fn area_below(&self, (_, first, room): Place) -> f64 {
+        self.area[first + room] - self.area[first]
     }
 
     fn leaf(&mut self, items: &[Item]) -> Child {
         let first = self.blocks.len();
         // In the order of their indices, so that equal input gives equal leaves however it was sorted.
-        let mut indices: Vec<u32> = items.iter().map(Item::triangle).collect();
+        let mut indices: Vec<u32> = items.iter().filter(|item| !item.is_none()).map(Item::triangle).collect();
         indices.sort_unstable();
+        // Parts of one triangle may have come together again.
+        indices.dedup();
         for four in indices.chunks(LANES) {
             let mut block = Block::EMPTY;
             for (lane, &triangle) in four.iter().enumerate() {

@@ -8,7 +8,7 @@
 //! of the largest coordinate (in f32 it loses all digits on slivers: 0.5 mm on one of 3 m by 1 mm).
 //!
 //! The tree finds what trying every triangle finds, bit for bit, because a box is never entered later than the distance
-//! computed for a triangle inside it: boxes grow by [`PAD`]. Multiplication and addition of the triangle test are never
+//! computed for a point inside it of a triangle: boxes grow by [`PAD`]. Multiplication and addition of the triangle test are never
 //! fused, or processors would disagree.
 
 use crate::{Hit, Ray};

@@ -13,6 +13,7 @@ pub mod emitters;
 mod intersect;
 mod portable;
 pub mod ray;
+mod spatial;
 pub mod tree;
 
 pub use brute::{blocked_brute, closest_brute, closest_where_brute};

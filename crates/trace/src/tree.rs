@@ -1,8 +1,8 @@
 //! The tree of boxes: who is met first along a ray, and is anyone in the way?
 //!
 //! Each node holds eight boxes, each leaf up to eight triangles in blocks of four. `build` makes a
-//! binary tree by the surface-area heuristic, `collapse` chooses which of its nodes remain, `avx2`
-//! and `portable` walk it, `intersect` says what a hit is. Which of two hits counts depends on them
+//! binary tree by the surface-area heuristic, `spatial` cuts triangles in parts that go to different leaves, `collapse` chooses which
+//! of its nodes remain, `avx2` and `portable` walk it, `intersect` says what a hit is. Which of two hits counts depends on them
 //! alone and not on the walk: the nearer one, at the same distance the one with the lower index; a back is taken to lie
 //! 2^-20 of the largest coordinate further away than it does. So answers are the same on every machine.
 
@@ -10,7 +10,7 @@ use crate::build::{Item, build};
 use crate::collapse::collapse;
 use crate::intersect::{Prepared, tie_of};
 use crate::{Hit, Ray, portable};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::ops::Range;
 
 /// Boxes of a node.
@@ -138,8 +138,8 @@ pub enum Flaw {
     /// A leaf refers to a block that does not exist, or that another leaf has as well.
     #[error("block {0} is out of range or in two leaves")]
     Block(usize),
-    /// A triangle is not in exactly one leaf, or its corners are not those given.
-    #[error("triangle {0} is in no leaf, in two, or has other corners")]
+    /// A triangle is in no leaf or twice in one, or its corners are not those given.
+    #[error("triangle {0} is in no leaf, twice in one, or has other corners")]
     Triangle(usize),
     /// A box does not contain what is below it.
     #[error("a box of node {0} does not contain what is below it")]
@@ -162,7 +162,7 @@ impl Tree {
         };
         let mut items: Vec<Item> = Vec::with_capacity(len);
         items.extend((0..len).filter_map(item));
-        let binary = build(&mut items);
+        let binary = build(&mut items, &corners);
         let (nodes, blocks) = collapse(&binary, &items, &corners);
         let bounds = binary.first().map(|root| [root.lo, root.hi]);
         let tie = bounds.map_or(0.0, tie_of);
@@ -233,7 +233,7 @@ impl Tree {
     }
 
     /// The nearest hit that `accept` (triangle, weights of its corners 1 and 2, back) does not refuse; the ray passes
-    /// through the others. `accept` may be asked about hits behind the nearest one, and in any order.
+    /// through the others. `accept` may be asked about hits behind the nearest one, about one more than once, and in any order.
     #[inline]
     pub fn closest_where(&self, ray: &Ray, mut accept: impl FnMut(u32, f32, f32, bool) -> bool) -> Option<Hit> {
         #[cfg(target_arch = "x86_64")]
@@ -249,7 +249,8 @@ impl Tree {
         self.blocked_where(ray, |_, _, _, _| true)
     }
 
-    /// Whether anything is hit that `accept` (triangle, weights of its corners 1 and 2, back) does not refuse.
+    /// Whether anything is hit that `accept` (triangle, weights of its corners 1 and 2, back) does not refuse. It may be asked about a hit more
+    /// than once.
     #[inline]
     pub fn blocked_where(&self, ray: &Ray, mut accept: impl FnMut(u32, f32, f32, bool) -> bool) -> bool {
         #[cfg(target_arch = "x86_64")]
@@ -280,14 +281,11 @@ impl Tree {
         }
     }
 
-    /// Checks the structure against the triangles it was built from: each of them (with finite corners) in exactly one
-    /// leaf, every box around all that is below it, every node and block reached once.
+    /// Checks the structure against the triangles it was built from: each of them (with finite corners) in a leaf or, in parts, in several, whose
+    /// boxes have all of it in them, every box around those below it, every node and block reached once.
     pub fn validate(&self, triangles: &[[Vec3; 3]]) -> Result<(), Flaw> {
-        let mut seen = Seen {
-            nodes: vec![false; self.nodes.len()],
-            blocks: vec![false; self.blocks.len()],
-            triangles: triangles.iter().map(|corners| corners.iter().any(|c| !c.is_finite())).collect(),
-        };
+        let mut seen =
+            Seen { nodes: vec![false; self.nodes.len()], blocks: vec![false; self.blocks.len()], parts: Vec::new() };
         if !self.nodes.is_empty() {
             seen.nodes[0] = true;
             // (node, the box it stands in)
@@ -305,9 +303,18 @@ impl Tree {
                         return Err(Flaw::Box(index));
                     }
                     if child.is_leaf() {
+                        let first = seen.parts.len();
                         for block in child.blocks() {
-                            self.validate_block(block, index, [lo, hi], triangles, &mut seen)?;
+                            once(&mut seen.blocks, block).ok_or(Flaw::Block(block))?;
+                            self.validate_block(block, triangles)?;
+                            let block =
+                                self.blocks[block].triangle.into_iter().filter(|triangle| *triangle != u32::MAX);
+                            seen.parts.extend(block.map(|triangle| Part { triangle, node: index, lo, hi }));
                         }
+                        let leaf = &mut seen.parts[first..];
+                        leaf.sort_by_key(|part| part.triangle);
+                        let twice = leaf.windows(2).find(|two| two[0].triangle == two[1].triangle);
+                        twice.map_or(Ok(()), |two| Err(Flaw::Triangle(two[0].triangle as usize)))?;
                     } else {
                         once(&mut seen.nodes, child.index()).ok_or(Flaw::Node(child.index()))?;
                         open.push((child.index(), [lo, hi]));
@@ -318,30 +325,26 @@ impl Tree {
         let missing = |seen: &[bool]| seen.iter().position(|seen| !seen);
         missing(&seen.nodes).map_or(Ok(()), |i| Err(Flaw::Node(i)))?;
         missing(&seen.blocks).map_or(Ok(()), |i| Err(Flaw::Block(i)))?;
-        missing(&seen.triangles).map_or(Ok(()), |i| Err(Flaw::Triangle(i)))
+        seen.parts.sort_by_key(|part| part.triangle);
+        let mut rest = &seen.parts[..];
+        for (triangle, corners) in triangles.iter().enumerate() {
+            let parts;
+            (parts, rest) = rest.split_at(rest.iter().take_while(|part| part.triangle as usize == triangle).count());
+            match parts {
+                [] if corners.iter().all(|c| c.is_finite()) => return Err(Flaw::Triangle(triangle)),
+                [] => {}
+                [part, ..] => is_covered(corners, parts).then_some(()).ok_or(Flaw::Box(part.node))?,
+            }
+        }
+        Ok(())
     }
 
-    fn validate_block(
-        &self,
-        block: usize,
-        node: usize,
-        [lo, hi]: [Vec3; 2],
-        triangles: &[[Vec3; 3]],
-        seen: &mut Seen,
-    ) -> Result<(), Flaw> {
-        once(&mut seen.blocks, block).ok_or(Flaw::Block(block))?;
-        for lane in 0..LANES {
-            let triangle = self.blocks[block].triangle[lane];
-            if triangle == u32::MAX {
-                continue;
-            }
-            let flaw = Flaw::Triangle(triangle as usize);
-            once(&mut seen.triangles, triangle as usize).ok_or(flaw)?;
-            if self.blocks[block].corners(lane) != triangles[triangle as usize].map(|c| c.to_array()) {
-                return Err(flaw);
-            }
-            if !triangles[triangle as usize].iter().all(|c| c.cmpge(lo).all() && c.cmple(hi).all()) {
-                return Err(Flaw::Box(node));
+    fn validate_block(&self, block: usize, triangles: &[[Vec3; 3]]) -> Result<(), Flaw> {
+        let block = &self.blocks[block];
+        for lane in (0..LANES).filter(|lane| block.triangle[*lane] != u32::MAX) {
+            let triangle = block.triangle[lane] as usize;
+            if triangles.get(triangle).map(|corners| corners.map(|c| c.to_array())) != Some(block.corners(lane)) {
+                return Err(Flaw::Triangle(triangle));
             }
         }
         Ok(())
@@ -351,7 +354,33 @@ impl Tree {
 struct Seen {
     nodes: Vec<bool>,
     blocks: Vec<bool>,
-    triangles: Vec<bool>,
+    parts: Vec<Part>,
+}
+
+/// A triangle in a leaf, whose box is in a node.
+struct Part {
+    triangle: u32,
+    node: usize,
+    lo: Vec3,
+    hi: Vec3,
+}
+
+/// Whether a triangle's corners lie in the boxes of its parts and, where there are several, points all over it too.
+fn is_covered(corners: &[Vec3; 3], parts: &[Part]) -> bool {
+    /// Steps along an edge.
+    const STEPS: usize = 16;
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    // What the rounding of points on the triangle may be off by.
+    let grace = 1e-15 * a.abs().max(b.abs()).max(c.abs()).max_element();
+    let lies_in = |p: DVec3, grace: f64, part: &Part| {
+        (p + grace).cmpge(part.lo.as_dvec3()).all() && (p - grace).cmple(part.hi.as_dvec3()).all()
+    };
+    let points = (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |k| [i, k].map(|i| i as f64 / STEPS as f64)));
+    let is_everywhere = || {
+        let mut points = points.map(|[u, v]| a + (b - a) * u + (c - a) * v);
+        points.all(|p| parts.iter().any(|part| lies_in(p, grace, part)))
+    };
+    [a, b, c].iter().all(|p| parts.iter().any(|part| lies_in(*p, 0.0, part))) && (parts.len() == 1 || is_everywhere())
 }
 
 /// Marks a place; `None` if it was marked before or does not exist.

@@ -65,7 +65,7 @@ fn agree(trees: &[Tree; 2], triangles: &[[Vec3; 3]], ray: &Ray) {
 }
 
 #[test]
-fn every_triangle_is_in_one_leaf_and_every_box_contains_what_is_below() {
+fn every_triangle_is_in_the_leaves_and_every_box_contains_what_is_below() {
     let mut random = Random(1);
     let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
     let mut inputs: Vec<Vec<[Vec3; 3]>> = vec![
@@ -88,6 +88,9 @@ fn every_triangle_is_in_one_leaf_and_every_box_contains_what_is_below() {
     for n in [3, 4, 5, 8, 9, 31, 33, 100, 1000, 20_000] {
         inputs.push((0..n).map(|_| random.point()).map(|p| one.map(|c| p + c * 0.1)).collect());
     }
+    inputs.push(needles(2000, 21));
+    // all in one place, so that each plane cuts all
+    inputs.push((0..1000).map(|i| [Vec3::ZERO, Vec3::ONE, Vec3::ONE + 1e-3 * Vec3::X * i as f32]).collect());
     for triangles in &inputs {
         let tree = Tree::new(triangles);
         assert_eq!(tree.validate(triangles), Ok(()), "{} triangles", triangles.len());
@@ -96,6 +99,50 @@ fn every_triangle_is_in_one_leaf_and_every_box_contains_what_is_below() {
             // Only that nothing panics: many of these coordinates are beyond what rays reach.
             tree.closest(&ray(random.point(), random.direction()));
         }
+    }
+}
+
+/// Small triangles and, one in ten, long thin ones in all directions.
+fn needles(n: usize, seed: u64) -> Vec<[Vec3; 3]> {
+    let mut random = Random(seed);
+    let mut triangle = |i: usize| {
+        let (from, to) = (random.point(), random.point());
+        if i % 10 == 0 {
+            [from, to, to + 0.003 * random.point()]
+        } else {
+            [from, from + 0.03 * to, from + 0.03 * random.point()]
+        }
+    };
+    (0..n).map(|i| triangle(i)).collect()
+}
+
+/// The boxes of leaves get smaller by cutting, and what is hit stays the same.
+#[test]
+fn long_triangles_are_in_several_leaves_and_give_what_every_triangle_gives() {
+    let triangles = needles(2000, 18);
+    let trees = both(&triangles);
+    let places = |tree: &Tree| tree.blocks.iter().flat_map(|block| block.triangle).filter(|t| *t != u32::MAX).count();
+    let count = places(&trees[0]);
+    assert!((2100..=2400).contains(&count), "{count} places for 2000 triangles");
+    let mut random = Random(19);
+    for i in 0..3000 {
+        let [a, b, c] = triangles[random.below(200) * 10];
+        // Anywhere along a long one, on an edge every other time.
+        let s = random.next();
+        let target = a + s * if i % 2 == 0 { b - a } else { 0.5 * (b + c) - a };
+        let origin = 1.5 * random.point();
+        agree(&trees, &triangles, &ray(origin, (target - origin).normalize()));
+    }
+
+    // Along the axes through a grid, whose planes are those of the boxes; and without a part nothing is right.
+    let mut triangles = grid(5);
+    triangles.extend(needles(1000, 20).iter().map(|needle| needle.map(|p| ((p + 1.0) * 10.0).round() * 0.25)));
+    let trees = both(&triangles);
+    assert!(places(&trees[0]) > triangles.len());
+    for i in 0..3000 {
+        let origin = (random.point() * 20.0).round() * 0.125 + 2.5;
+        let direction = if i % 2 == 0 { Vec3::AXES[i / 2 % 3] } else { random.direction() };
+        agree(&trees, &triangles, &ray(origin, direction));
     }
 }
 
@@ -119,6 +166,20 @@ fn validation_sees_what_is_wrong() {
     let mut moved = triangles.clone();
     moved[7][0] += 0.01;
     assert_eq!(good.validate(&moved), Err(Flaw::Triangle(7)));
+
+    // One part of a triangle missing.
+    let triangles = needles(1000, 23);
+    let mut tree = Tree::new(&triangles);
+    assert_eq!(tree.validate(&triangles), Ok(()));
+    let mut seen = vec![false; triangles.len()];
+    let mut places = (0..tree.blocks.len()).flat_map(|block| (0..LANES).map(move |lane| (block, lane)));
+    let again = |&(block, lane): &(usize, usize)| {
+        let triangle = tree.blocks[block].triangle[lane];
+        triangle != u32::MAX && std::mem::replace(&mut seen[triangle as usize], true)
+    };
+    let (block, lane) = places.find(again).expect("a triangle in two leaves");
+    tree.blocks[block].set(lane, u32::MAX, &[Vec3::NAN; 3]);
+    assert!(matches!(tree.validate(&triangles), Err(Flaw::Box(_))));
 }
 
 #[test]
@@ -128,7 +189,8 @@ fn the_tree_is_the_same_for_any_number_of_threads() {
         let p = random.point();
         [p, p + random.point() * 0.02, p + random.point() * 0.02]
     };
-    let triangles: Vec<_> = (0..30_000).map(|_| small()).collect();
+    let mut triangles: Vec<_> = (0..30_000).map(|_| small()).collect();
+    triangles.extend(needles(10_000, 22));
     let [one, four] = [1, 4].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| Tree::new(&triangles))
