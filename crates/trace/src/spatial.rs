@@ -13,6 +13,10 @@ use glam::{DVec3, Vec3, Vec4};
 /// Planes per axis plus one. With 8 rays in an office visit 8 % more nodes, 32 and 64 gain nothing.
 const BINS: usize = 16;
 
+/// Planes are looked for along axes of at least this part of the longest extent. With 0.75 rays in an office visit 7 % more nodes; without, building
+/// takes a sixth longer for the same tree.
+const LONG: f32 = 0.5;
+
 /// A plane across an axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plane {
@@ -50,7 +54,8 @@ impl Plane {
         let extent = bounds.hi - bounds.lo;
         let (width, scale) = (extent / BINS as f32, BINS as f32 / extent);
         let plane = |axis: usize, i: usize| bounds.lo[axis] + width[axis] * i as f32;
-        let is_wide = |axis: &usize| extent[*axis] > f32::MIN_POSITIVE && extent[*axis] < f32::MAX;
+        let least = LONG * extent.truncate().max_element();
+        let is_long = |axis: &usize| extent[*axis] >= least.max(f32::MIN_POSITIVE) && extent[*axis] < f32::MAX;
         let bin = |x: f32| (x as usize).min(BINS - 1);
 
         // Cut every item at all planes.
@@ -58,7 +63,7 @@ impl Plane {
         for item in items {
             let (enter, leave) = ((item.lo - bounds.lo) * scale, (item.hi - bounds.lo) * scale);
             let mut own = None;
-            for axis in (0..3).filter(is_wide) {
+            for axis in (0..3).filter(is_long) {
                 let (first, last) = (bin(enter[axis]), bin(leave[axis]));
                 let bins = &mut filled[axis];
                 bins[first].enter += 1;
@@ -74,7 +79,7 @@ impl Plane {
 
         // Sweep the planes of each axis from right to left, then from left to right.
         let mut best: Option<Plane> = None;
-        for axis in (0..3).filter(is_wide) {
+        for axis in (0..3).filter(is_long) {
             let bins = &filled[axis];
             let mut rights = [(Bounds::EMPTY, 0); BINS];
             let mut right = (Bounds::EMPTY, 0);

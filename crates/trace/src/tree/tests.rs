@@ -107,13 +107,13 @@ fn needles(n: usize, seed: u64) -> Vec<[Vec3; 3]> {
     let mut random = Random(seed);
     let mut triangle = |i: usize| {
         let (from, to) = (random.point(), random.point());
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             [from, to, to + 0.003 * random.point()]
         } else {
             [from, from + 0.03 * to, from + 0.03 * random.point()]
         }
     };
-    (0..n).map(|i| triangle(i)).collect()
+    (0..n).map(triangle).collect()
 }
 
 /// The boxes of leaves get smaller by cutting, and what is hit stays the same.
