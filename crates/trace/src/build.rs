@@ -134,8 +134,19 @@ pub(crate) struct Binary {
     pub lo: Vec3,
     pub hi: Vec3,
     pub left: u32,
-    /// How it hangs below the wide tree's nodes: [`choose`].
-    pub slots: [u8; WIDTH - 1],
+    /// How it hangs below the wide tree's nodes, three bits each: [`choose`].
+    slots: u32,
+}
+
+impl Binary {
+    /// The i-th of the numbers by which it hangs below the wide tree's nodes.
+    pub fn slots(&self, i: usize) -> usize {
+        (self.slots >> (3 * i) & 7) as usize
+    }
+
+    fn set_slots(&mut self, slots: [u8; WIDTH - 1]) {
+        self.slots = slots.iter().rev().fold(0, |bits, slots| bits << 3 | u32::from(*slots));
+    }
 }
 
 /// Sorts `items` into the order of the tree's leaves, with parts of triangles and empty places among them, and returns its nodes, the root first.
@@ -164,10 +175,11 @@ impl<C: Fn(usize) -> [Vec3; 3] + Sync> Builder<'_, C> {
     /// Makes the nodes of the first `count` items. Answers what the root costs the node above it, which no node keeps.
     fn grow(&self, items: &mut [Item], count: usize, nodes: &mut [Binary], depth: usize) -> Costs {
         let bounds = Bounds::of(&items[..count]);
-        let node = Binary { lo: bounds.lo.truncate(), hi: bounds.hi.truncate(), ..Binary::default() };
+        let mut node = Binary { lo: bounds.lo.truncate(), hi: bounds.hi.truncate(), ..Binary::default() };
         if count == 1 {
             let (slots, costs) = choose(1, bounds.area(), None);
-            nodes[0] = Binary { slots, ..node };
+            node.set_slots(slots);
+            nodes[0] = node;
             return costs;
         }
 
@@ -181,7 +193,9 @@ impl<C: Fn(usize) -> [Vec3; 3] + Sync> Builder<'_, C> {
         let (on_left, on_right) =
             if count >= FORK { rayon::join(grow_left, grow_right) } else { (grow_left(), grow_right()) };
         let (slots, costs) = choose(left + right, bounds.area(), Some([&on_left, &on_right]));
-        root[0] = Binary { left: room as u32, slots, ..node };
+        node.left = room as u32;
+        node.set_slots(slots);
+        root[0] = node;
         costs
     }
 

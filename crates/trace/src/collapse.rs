@@ -73,7 +73,7 @@ pub(crate) fn collapse<C: Fn(usize) -> [Vec3; 3]>(
     let mut wide = Wide { binary, items, corners, area, nodes: Vec::new(), blocks: Vec::new() };
     if !binary.is_empty() {
         wide.nodes.push(Node::EMPTY);
-        if binary[0].slots[0] == 0 {
+        if binary[0].slots(0) == 0 {
             // A tree of one leaf still gets a node above it.
             wide.fill(0, &mut [(0, 0, items.len())]);
         } else {
@@ -105,12 +105,12 @@ impl<C: Fn(usize) -> [Vec3; 3]> Wide<'_, C> {
     fn open(&self, (at, first, room): Place, slots: usize, children: &mut Vec<Place>) {
         let node = &self.binary[at];
         let left = node.left as usize;
-        let k = node.slots[if slots == WIDTH { 0 } else { slots - 1 }] as usize;
+        let k = node.slots(if slots == WIDTH { 0 } else { slots - 1 });
         for (at, first, room, slots) in
             [(at + 1, first, left, k), (at + 2 * left, first + left, room - left, slots - k)]
         {
             // Where fewer slots cost as much, fewer are taken; with one left the subtree stays closed.
-            let slots = (2..=slots).rev().find(|&i| self.binary[at].slots[i - 1] != 0);
+            let slots = (2..=slots).rev().find(|&i| self.binary[at].slots(i - 1) != 0);
             match slots {
                 Some(slots) => self.open((at, first, room), slots, children),
                 None => children.push((at, first, room)),
@@ -130,7 +130,7 @@ impl<C: Fn(usize) -> [Vec3; 3]> Wide<'_, C> {
                 node.bounds[axis][slot] = binary.lo[axis];
                 node.bounds[axis + 3][slot] = binary.hi[axis];
             }
-            node.child[slot] = if binary.slots[0] == 0 {
+            node.child[slot] = if binary.slots(0) == 0 {
                 self.leaf(&self.items[first..first + room])
             } else {
                 self.nodes.push(Node::EMPTY);

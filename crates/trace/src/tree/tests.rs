@@ -105,7 +105,7 @@ fn every_triangle_is_in_the_leaves_and_every_box_contains_what_is_below() {
 /// Small triangles and, one in ten, long thin ones in all directions.
 fn needles(n: usize, seed: u64) -> Vec<[Vec3; 3]> {
     let mut random = Random(seed);
-    let mut triangle = |i: usize| {
+    let triangle = |i: usize| {
         let (from, to) = (random.point(), random.point());
         if i.is_multiple_of(10) {
             [from, to, to + 0.003 * random.point()]
