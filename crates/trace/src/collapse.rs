@@ -9,6 +9,7 @@
 //! Children stand in a node in order of the area of the triangles below them, the largest last: where any hit will do they are looked at
 //! from there on (Nah & Manocha 2014, "SATO: Surface area traversal order for shadow ray tracing"). Between random points of a furnished
 //! room rays visit 8.5 nodes so instead of 10.2, in a building of 1,200 rooms 7.4 instead of 8.3, and more often the same ones.
+//! Triangles that were cut count whole with each part: by the sizes of their parts rays visit as many nodes.
 
 use crate::build::{Binary, Item};
 use crate::tree::{Block, Child, LANES, MAX_BLOCKS, Node, WIDTH};

@@ -2,7 +2,8 @@
 //!
 //! Stich, Friedrich & Dietrich 2009, "Spatial splits in bounding volume hierarchies". The box of a triangle that is long and lies across
 //! the axes is much larger than the triangle, and so are the boxes of all nodes above it; cut in two it fits better. A cut triangle
-//! that costs less as a whole on one side goes there (section 4.4).
+//! that costs less as a whole on one side goes there (section 4.4). Cutting large triangles beforehand, wherever they lie, made rays in a furnished
+//! room visit a tenth fewer nodes and in a building a tenth more.
 //!
 //! Parts' boxes are rounded outwards: each point of a triangle lies in the box of one of its parts, but for 2^-53 of its coordinates,
 //! which is less than 2^-29 of the scene and far less than what boxes grow by when rays meet them.
