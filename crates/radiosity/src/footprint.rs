@@ -1,9 +1,9 @@
 //! Memory, told before it is taken: what a scene holds, what making its mesh and its tree takes on the way, and what a solution takes.
+//! The table of hits is no part of it: what memory does not hold of that lies in a file.
 //!
 //! Bytes are counted or, where they depend on more than counts, the most that was measured: a building and a soup of a million and
 //! of ten million triangles took 110 to 270 bytes a triangle to weld and 200 for the tree (peak of the process less what it held).
 
-use crate::solution::LEAST_RAYS;
 use radiosity_scene::{Bands, Scene};
 use radiosity_trace::Tracer;
 use radiosity_transport::Luminaires;
@@ -19,10 +19,10 @@ const WELDED: usize = 28;
 const IN_TREE: usize = 84;
 
 /// Bytes of an element: what a solution keeps of it, 175, and while it is solved, 256; the rest is the field that is shown.
-const ELEMENT: usize = 500;
+pub const ELEMENT_BYTES: usize = 500;
 
 fn of_element(lights: usize) -> usize {
-    ELEMENT + lights * size_of::<Bands>()
+    ELEMENT_BYTES + lights * size_of::<Bands>()
 }
 
 /// Bytes of a scene with its mesh and its tree.
@@ -30,11 +30,9 @@ fn held(tracer: &Tracer) -> usize {
     tracer.scene.bytes() + tracer.mesh.bytes() + tracer.bytes()
 }
 
-/// Bytes of a solution of so many elements in so many cells with `rays` each and direct light of so many lights, with all that it
-/// is made of.
-pub(crate) fn solution(tracer: &Tracer, (elements, cells): (usize, usize), rays: usize, lights: usize) -> usize {
-    let of_elements = elements.saturating_mul(of_element(lights));
-    held(tracer).saturating_add(of_elements).saturating_add(cells.saturating_mul(rays * size_of::<u32>()))
+/// Bytes of a solution of so many elements with direct light of so many lights, with all that it is made of but the table of hits.
+pub(crate) fn solution(tracer: &Tracer, elements: usize, lights: usize) -> usize {
+    held(tracer).saturating_add(elements.saturating_mul(of_element(lights)))
 }
 
 /// The smallest limit of memory within which light can be found in a scene: what it takes to weld it, to build its tree, or to solve
@@ -44,8 +42,7 @@ pub fn least_memory(scene: &Scene) -> usize {
     let two_sided = scene.objects.iter().filter(|object| scene.materials[object.material].has_two_sides());
     let sides = triangles + two_sided.map(|object| object.triangles.len()).sum::<usize>();
     let welded = scene.bytes() + triangles * WELDED + size_of_val(&*scene.positions);
-    let of_side = of_element(Luminaires::most(scene)) + LEAST_RAYS * size_of::<u32>();
-    let solved = welded + triangles * IN_TREE + sides * of_side;
+    let solved = welded + triangles * IN_TREE + sides * of_element(Luminaires::most(scene));
     (scene.bytes() + triangles * WELDING).max(welded + triangles * BUILDING).max(solved)
 }
 
@@ -91,6 +88,6 @@ mod tests {
             matches!(within(least / 2), Err(Error::Memory { least: told, needed, .. }) if told == least && needed > least / 2)
         );
         // What is held is what was told, within what only some scenes need.
-        assert!(held(&tracer) < least && least < 4 * held(&tracer) + scene.triangles.len() * ELEMENT, "{least}");
+        assert!(held(&tracer) < least && least < 4 * held(&tracer) + scene.triangles.len() * ELEMENT_BYTES, "{least}");
     }
 }
