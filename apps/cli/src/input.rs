@@ -72,7 +72,7 @@ pub struct SolveArguments {
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     pub element_size: Option<f64>,
     /// Memory for the scene and all that is worked out, e.g. 4G or 500M, also written 4GiB or 500MB; powers of 1024. What does not
-    /// fit is told before it is taken.
+    /// fit is told before it is taken; rays that it does not hold lie in a temporary file, in the folder that TMPDIR (TMP on Windows) names.
     #[arg(long, default_value = "4G", value_name = "BYTES", allow_hyphen_values = true, value_parser = numbers::bytes)]
     pub memory: usize,
     /// How light between elements is found: rays, the default, or one of adaptive, hemicube, hemicube-midpoint, single-plane,

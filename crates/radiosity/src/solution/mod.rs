@@ -229,10 +229,11 @@ impl<'a> Solution<'a> {
     }
 
     /// Bytes that the scene, its mesh and tree and a solution with these options take, as far as that is known before the
-    /// elements are made: none of them divided, without what each light gives to each. Rays may lie in a file and do not count.
+    /// elements are made: none of them divided. Rays may lie in a file and do not count.
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
         let cells = Elements::count(tracer.scene, tracer.mesh, element_size(tracer, options));
-        footprint::solution(tracer, cells, 0).saturating_add(options.stored(cells))
+        let solution = footprint::solution(tracer, cells, Luminaires::most(tracer.scene));
+        solution.saturating_add(options.stored(cells))
     }
 
     /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
