@@ -195,13 +195,13 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let files = std::iter::once(target.as_path()).chain(pages.iter().map(PathBuf::as_path)).chain(written);
     let files: Vec<&Path> = files.chain(arguments.report.iter().map(PathBuf::as_path)).collect();
 
-    if !input.scene.sky.is_black() && baked.solution.balance().from_sky.iter().all(|flux| *flux == 0.0) {
+    if !input.scene.sky.is_black() && baked.solution.balance()?.from_sky.iter().all(|flux| *flux == 0.0) {
         progress.say(
             "warning: no light of the sky reaches any surface; the model has no opening, or faces look the wrong way",
         );
     }
     let written = (&audit, rounds, lightmap, is_hurried);
-    let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref(), exposure), written, &files, progress);
+    let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref(), exposure), written, &files, progress)?;
     for path in &arguments.report {
         let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,

@@ -5,8 +5,10 @@ use crate::{Failure, Global, faults, numbers};
 use clap::Args;
 use radiosity::io::{Document, LoadOptions};
 use radiosity::solve::Solver;
-use radiosity::transport::{FormFactorMethod, HitTable};
-use radiosity::{Displayed, Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up, counted, least_memory, size};
+use radiosity::transport::FormFactorMethod;
+use radiosity::{
+    Displayed, ELEMENT_BYTES, Faults, Mesh, Scene, Severity, Sky, TEXEL_BYTES, Up, counted, least_memory, size,
+};
 use std::f64::consts::SQRT_2;
 use std::path::{Path, PathBuf};
 
@@ -70,7 +72,7 @@ pub struct SolveArguments {
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     pub element_size: Option<f64>,
     /// Memory for the scene and all that is worked out, e.g. 4G or 500M, also written 4GiB or 500MB; powers of 1024. What does not
-    /// fit is told before it is taken.
+    /// fit is told before it is taken; rays that it does not hold lie in a temporary file, in the folder that TMPDIR (TMP on Windows) names.
     #[arg(long, default_value = "4G", value_name = "BYTES", allow_hyphen_values = true, value_parser = numbers::bytes)]
     pub memory: usize,
     /// How light between elements is found: rays, the default, or one of adaptive, hemicube, hemicube-midpoint, single-plane,
@@ -136,8 +138,7 @@ impl SolveArguments {
     /// at most, which may take long and is not what was asked for either.
     pub fn refuse_tiny_elements(&self, mesh: &Mesh) -> Result<(), Failure> {
         let Some(size) = self.element_size else { return Ok(()) };
-        let bytes = HitTable::bytes(1, self.options().rays);
-        self.refuse_beyond_memory(mesh, "--element-size", "elements", bytes, 0.5 * size * size, |width| {
+        self.refuse_beyond_memory(mesh, "--element-size", "elements", ELEMENT_BYTES, 0.5 * size * size, |width| {
             format!("{} or more", numbers::rough(width * SQRT_2))
         })
     }

@@ -2,7 +2,7 @@
 
 use crate::illuminance::Illuminance;
 use crate::progress::Progress;
-use crate::{figures, input};
+use crate::{Failure, figures, input};
 use radiosity::measure::Round;
 use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Shown, Sky, View, WrittenRound};
 use serde::Serialize;
@@ -264,7 +264,7 @@ impl Report {
         (written, written_rounds, lightmap, is_hurried): (&Audit, Vec<WrittenRound>, Option<LightmapReport>, bool),
         outputs: &[&Path],
         progress: &Progress,
-    ) -> Report {
+    ) -> Result<Report, Failure> {
         let solution = &baked.solution;
         let finer = match &lightmap {
             Some(map) => {
@@ -291,12 +291,12 @@ impl Report {
         };
         let (illuminance, balance, raw_closure) = (
             Illuminance::new(solution, view.map(|v| v.illuminance.as_slice())),
-            solution.balance(),
-            solution.raw_closure(),
+            solution.balance()?,
+            solution.raw_closure()?,
         );
         let stages: Vec<StageReport> =
             progress.spent().into_iter().map(|(name, seconds)| StageReport { name, seconds }).collect();
-        Report {
+        Ok(Report {
             program: "radiosity".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: command(),
@@ -344,7 +344,7 @@ impl Report {
             faults: input.faults.clone(),
             outputs: outputs.iter().map(|path| path.display().to_string()).collect(),
             about: figures::ABOUT.iter().copied().collect(),
-        }
+        })
     }
 }
 

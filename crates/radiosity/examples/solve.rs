@@ -35,7 +35,7 @@ fn main() -> Result<(), radiosity::Error> {
     for (object, [lumens, square_metres]) in scene.objects.iter().zip(sums) {
         println!("{:12}{:5.0} lx on {square_metres:5.2} m²", object.name, lumens / square_metres);
     }
-    let balance = solution.balance();
+    let balance = solution.balance()?;
     println!("{:.0} lm from the lamp, {:.0} lm absorbed", luminance(balance.emitted), luminance(balance.absorbed));
     Ok(())
 }

@@ -159,7 +159,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut rounds = Vec::new();
     loop {
         // Elements that are only looked up make no field: a picture gathers for those that it shows.
-        let received = if solve.looked_up { solution.indirect_halves() } else { solution.received(monitor)? };
+        let received = if solve.looked_up { solution.indirect_halves()? } else { solution.received(monitor)? };
         let field = solution.field_of(&received);
         let mut read = |gather: usize| {
             let indirect = if gather == 0 { Indirect::Field(&field) } else { Indirect::Gather { rays: gather } };
@@ -221,7 +221,26 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let is_last = achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) || is_stalled(&rounds);
         // Once begun a round is brought to its end, so that what it replaces may go.
         let out_of_time = !is_last && !has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64());
-        if is_last || out_of_time {
+        let mut ends = is_last || out_of_time;
+        if !ends {
+            monitor.round(rounds.len() + 1, options.rounds + 1);
+            begun = Instant::now();
+            shadowing.rays *= 2;
+            if noisy {
+                match solution.refine(next.rays, monitor) {
+                    Err(Error::File(error)) => {
+                        monitor.warn(&format!("{error}; the answer is that of the rounds before"));
+                        ends = true;
+                    }
+                    done => done?,
+                }
+            } else {
+                stages.absorb(&solution.stages);
+                drop(solution);
+                solution = Solution::new(tracer, &next, monitor)?;
+            }
+        }
+        if ends {
             stages.absorb(&solution.stages);
             return Ok(Baked {
                 solution,
@@ -241,16 +260,6 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 watched,
                 light,
             });
-        }
-        monitor.round(rounds.len() + 1, options.rounds + 1);
-        begun = Instant::now();
-        shadowing.rays *= 2;
-        if noisy {
-            solution.refine(next.rays, monitor)?;
-        } else {
-            stages.absorb(&solution.stages);
-            drop(solution);
-            solution = Solution::new(tracer, &next, monitor)?;
         }
     }
 }

@@ -12,7 +12,7 @@ use radiosity_solve::{
     solve_operator,
 };
 use radiosity_transport::view_factors::ViewFactorOptions;
-use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors, HitTable, Progress};
+use radiosity_transport::{FileError, FormFactorMethod, FormFactorOptions, FormFactors, HitTable, Progress};
 use std::time::Instant;
 
 /// Accuracy of adaptive factors. Light is asked for to a percent or so, and a row has hundreds of entries that err either
@@ -43,11 +43,11 @@ impl Matrix {
     }
 
     /// F times a field of four bands.
-    pub fn gather(&self, values: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    pub fn gather(&self, values: &[[f32; 4]]) -> Result<Vec<[f32; 4]>, SolveError> {
         let b: Vec<f64> = values.iter().flatten().map(|x| f64::from(*x)).collect();
         let mut h = vec![0.0; b.len()];
-        self.factors.apply(&b, &mut h, 4);
-        h.chunks_exact(4).map(|h| std::array::from_fn(|k| h[k] as f32)).collect()
+        self.factors.apply(&b, &mut h, 4)?;
+        Ok(h.chunks_exact(4).map(|h| std::array::from_fn(|k| h[k] as f32)).collect())
     }
 }
 
@@ -192,10 +192,14 @@ pub(crate) fn solve(
     let solved = match matrix {
         Some(matrix) => solve_stored(solver, &matrix.factors, response, e, x, &params, step),
         None if solver.applies_only() => solve_operator(solver, table, response, e, x, &params, step),
-        None => solve_stored(solver, &table.matrix()?, response, e, x, &params, step),
+        None => table.matrix().and_then(|stored| solve_stored(solver, &stored, response, e, x, &params, step)),
     };
     solved.map_err(|error| match (error, task.displayed) {
         (SolveError::Stopped, _) => Error::Stopped,
+        (SolveError::Transport(error), _) => match error.downcast::<FileError>() {
+            Ok(error) => Error::File(*error),
+            Err(other) => Error::Solve(SolveError::Transport(other)),
+        },
         (SolveError::NotConverged { info, .. }, Some((_, Displayed { delta_e, .. }))) => {
             Error::Displayed { asked: delta_e, reached, steps: info.steps }
         }

@@ -41,22 +41,24 @@ pub enum Error {
     Time(&'static str),
     /// The memory that was allowed does not suffice.
     #[error(
-        "{elements} elements with {rays} rays each, and the scene, need {}; {} allowed (use larger elements or allow more; {} MB would \
-         be the least)",
-        size(*needed), are(*allowed), least.div_ceil(1 << 20)
+        "{elements} elements{} and the scene, need {}; {} allowed (use larger elements or allow more; {} MB would be the least)",
+        rays.map_or(",".to_owned(), |rays| format!(" with {rays} rays each,")), size(*needed), are(*allowed), least.div_ceil(1 << 20)
     )]
     Memory {
         /// Elements asked for.
         elements: usize,
-        /// Rays per cell.
-        rays: usize,
+        /// Rays per cell, where these have to be in memory.
+        rays: Option<usize>,
         /// Bytes needed.
         needed: usize,
         /// Bytes allowed.
         allowed: usize,
-        /// Bytes that the scene needs with the largest elements and the fewest rays.
+        /// Bytes that the scene needs with the largest elements.
         least: usize,
     },
+    /// The memory that was allowed does not hold the rays, and a file for them failed.
+    #[error("{0}")]
+    File(#[from] radiosity_transport::FileError),
     /// The memory that was allowed does not hold form factors between all elements.
     #[error(
         "form factors between {elements} elements need {}; {} allowed (ask for fewer elements than {asked}, though each \
@@ -129,6 +131,15 @@ fn are(allowed: usize) -> String {
 impl From<radiosity_transport::Stopped> for Error {
     fn from(_: radiosity_transport::Stopped) -> Self {
         Error::Stopped
+    }
+}
+
+impl From<radiosity_transport::ExtendError> for Error {
+    fn from(error: radiosity_transport::ExtendError) -> Self {
+        match error {
+            radiosity_transport::ExtendError::Stopped(_) => Error::Stopped,
+            radiosity_transport::ExtendError::File(error) => Error::File(error),
+        }
     }
 }
 

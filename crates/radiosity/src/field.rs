@@ -37,7 +37,7 @@ impl Solution<'_> {
     /// The continuous field of the indirect irradiance.
     ///
     /// # Errors
-    /// [`Error::Stopped`].
+    /// [`Error::Stopped`]; [`Error::File`].
     pub fn indirect_field(&self, monitor: &dyn Monitor) -> Result<Field, Error> {
         Ok(self.field_of(&self.received(monitor)?))
     }
@@ -53,7 +53,7 @@ impl Solution<'_> {
                 normals.iter().any(|normal| normal.dot(own) < FLAT)
             })
             .collect();
-        let mut light = self.indirect_halves();
+        let mut light = self.indirect_halves()?;
         let mut rays = self.rays();
         if let Some(left) = pace::left(monitor)
             && rays > LEAST_SEEN

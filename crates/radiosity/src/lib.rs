@@ -51,7 +51,7 @@ pub use displayed::{Displayed, Shown};
 pub use equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
 pub use error::Error;
 pub use factors::{Doubt, Excess, Factors, FactorsOptions, Missed, factors};
-pub use footprint::least_memory;
+pub use footprint::{ELEMENT_BYTES, least_memory};
 pub use judge::WrittenRound;
 pub use lightmap::{Lightmap, TEXEL_BYTES, lightmap, points_about};
 pub use measure::{MeasureOptions, Measurement, measure};

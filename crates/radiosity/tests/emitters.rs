@@ -83,7 +83,7 @@ fn the_balance_closes_with_blended_surfaces() {
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
     let balance =
-        Solution::new(&tracer, &SolveOptions { rays: 512, ..SolveOptions::default() }, &()).unwrap().balance();
+        Solution::new(&tracer, &SolveOptions { rays: 512, ..SolveOptions::default() }, &()).unwrap().balance().unwrap();
     assert!((f64::from(balance.emitted[1]) / (0.5 * 1000.0 * PI) - 1.0).abs() < 1e-3, "{balance:?}");
     assert!(balance.defect.iter().all(|d| d.abs() < 0.01), "{balance:?}");
 }

@@ -29,7 +29,7 @@ pub fn bicgstab<T: Transport>(
     let gauge = Gauge::new(transport, response, e);
     let dot = |x: &[f64], y: &[f64]| transport.space().inner(x, y, bands);
     let (mut h, mut r) = (vec![0.0; n], vec![0.0; n]);
-    let begun = begin(transport, b, &mut h, bands);
+    let begun = begin(transport, b, &mut h, bands)?;
     remainder(response, (e, b, &h), &mut r);
     let mut shadow = r.clone();
     let (mut p, mut v, mut t) = (r.clone(), vec![0.0; n], vec![0.0; n]);
@@ -42,14 +42,14 @@ pub fn bicgstab<T: Transport>(
         }
 
         // Along p, as far as the shadow says; s is left in r.
-        image(transport, response, &p, &mut h, &mut v);
+        image(transport, response, &p, &mut h, &mut v)?;
         let along = dot(&shadow, &v);
         let alpha: Vec<f64> = (0..bands).map(|band| ratio(rho[band], along[band])).collect();
         for k in 0..n {
             r[k] -= alpha[k % bands] * v[k];
         }
         // Along s, to the smallest residual.
-        image(transport, response, &r, &mut h, &mut t);
+        image(transport, response, &r, &mut h, &mut t)?;
         let (ts, tt) = (dot(&t, &r), dot(&t, &t));
         let omega: Vec<f64> = (0..bands).map(|band| ratio(ts[band], tt[band])).collect();
         for k in 0..n {

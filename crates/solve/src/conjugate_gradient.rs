@@ -42,7 +42,7 @@ pub fn conjugate_gradient<T: Transport>(
         }
     }
     let (mut h, mut r, mut ap) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    transport.apply(b, &mut h, bands);
+    transport.apply(b, &mut h, bands)?;
     remainder(response, (e, b, &h), &mut r);
     let gauge = Gauge::new(transport, response, e);
     let mut info = Info { steps: 1, work: 1.0, ..Info::default() };
@@ -54,7 +54,7 @@ pub fn conjugate_gradient<T: Transport>(
             return Ok(info);
         }
 
-        image(transport, response, &p, &mut h, &mut ap);
+        image(transport, response, &p, &mut h, &mut ap)?;
         info.steps += 1;
         info.work += 1.0;
         let pap = dot(&p, &ap);

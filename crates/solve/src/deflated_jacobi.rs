@@ -45,7 +45,7 @@ pub fn deflated_jacobi<T: Transport>(
     };
     let (mut v, mut fv) = (vec![0.0; n], vec![0.0; n]);
     response.respond(&ones, &mut v);
-    transport.apply(&v, &mut fv, bands);
+    transport.apply(&v, &mut fv, bands)?;
     response.respond(&fv, &mut r);
     let kept: Vec<f64> = v.iter().zip(&r).map(|(v, rfv)| v - rfv).collect();
     let mut coarse = Coarse { balance: balance(&kept), links: Vec::new() };
@@ -53,7 +53,7 @@ pub fn deflated_jacobi<T: Transport>(
         coarse.link(space, sheets, &fv, bands, part);
     }
 
-    transport.apply(b, &mut h, bands);
+    transport.apply(b, &mut h, bands)?;
     let gauge = Gauge::new(transport, response, e);
     let mut info = Info { steps: 2, work: 2.0, ..Info::default() };
     loop {
@@ -66,7 +66,7 @@ pub fn deflated_jacobi<T: Transport>(
         for (b, r) in b.iter_mut().zip(&r) {
             *b += r;
         }
-        transport.apply(b, &mut h, bands);
+        transport.apply(b, &mut h, bands)?;
         info.steps += 1;
         info.work += 1.0;
 

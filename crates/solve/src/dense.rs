@@ -31,7 +31,7 @@ pub(crate) fn check_numbers(area: &[f64], mut factors: impl Iterator<Item = f64>
 /// // Two parallel plates with areas 1 and 2: F_12 = 0.2, and F_21 = 0.1 by reciprocity.
 /// let plates = DenseTransport::new(vec![1.0, 2.0], vec![0.0, 0.2, 0.1, 0.0])?;
 /// let mut h = [0.0; 2];
-/// plates.apply(&[1.0, 0.0], &mut h, 1);
+/// plates.apply(&[1.0, 0.0], &mut h, 1)?;
 /// assert_eq!(h, [0.0, 0.1]);
 /// # Ok::<(), radiosity_solve::SolveError>(())
 /// ```
@@ -81,7 +81,7 @@ impl Transport for DenseTransport {
         &self.space
     }
 
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) -> Result<(), SolveError> {
         let n = self.space.dim();
         h.par_chunks_exact_mut(bands).zip(self.rows.par_chunks_exact(n.max(1))).for_each(|(h, row)| {
             h.fill(0.0);
@@ -91,6 +91,7 @@ impl Transport for DenseTransport {
                 }
             }
         });
+        Ok(())
     }
 
     fn row_sum(&self) -> f64 {

@@ -108,7 +108,7 @@ fn finish<T: Rows>(
     mut step: impl FnMut(&[f64], &Info) -> Go,
 ) -> Result<Info, SolveError> {
     let (mut h, mut r) = (vec![0.0; b.len()], vec![0.0; b.len()]);
-    transport.apply(b, &mut h, response.bands());
+    transport.apply(b, &mut h, response.bands())?;
     let mut info = Info { steps: 1, work: work + 1.0, ..Info::default() };
     Gauge::new(transport, response, e).measure(transport, response, (e, b, &h), &mut r, &mut info);
     // There is no second step: what is not done now never will be.

@@ -67,13 +67,13 @@ pub(crate) fn remainder(response: &(impl Response + ?Sized), (e, b, h): (&[f64],
 }
 
 /// Writes h = F b for the start of an iteration and says how many applications that took: none for a start from zero.
-pub(crate) fn begin<T: Transport>(transport: &T, b: &[f64], h: &mut [f64], bands: usize) -> usize {
+pub(crate) fn begin<T: Transport>(transport: &T, b: &[f64], h: &mut [f64], bands: usize) -> Result<usize, SolveError> {
     if b.iter().all(|b| *b == 0.0) {
         h.fill(0.0);
-        return 0;
+        return Ok(0);
     }
-    transport.apply(b, h, bands);
-    1
+    transport.apply(b, h, bands)?;
+    Ok(1)
 }
 
 /// The norm of a residual relative to that of the right-hand side; nothing is left of nothing.

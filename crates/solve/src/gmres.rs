@@ -27,7 +27,7 @@ pub fn gmres<T: Transport>(
     let gauge = Gauge::new(transport, response, e);
     let dot = |x: &[f64], y: &[f64]| transport.space().inner(x, y, bands);
     let (mut h, mut r) = (vec![0.0; n], vec![0.0; n]);
-    let begun = begin(transport, b, &mut h, bands);
+    let begun = begin(transport, b, &mut h, bands)?;
     remainder(response, (e, b, &h), &mut r);
     let mut info = Info { steps: begun, work: begun as f64, ..Info::default() };
     // Directions p, their images A p, and the squares of these by band.
@@ -43,7 +43,7 @@ pub fn gmres<T: Transport>(
 
         // The residual is the new direction, once its image has lost what the others' have.
         let (mut p, mut own) = (r.clone(), vec![0.0; n]);
-        image(transport, response, &p, &mut h, &mut own);
+        image(transport, response, &p, &mut h, &mut own)?;
         for (other, of_other, square) in &kept {
             let share = dot(&own, of_other);
             for k in 0..n {

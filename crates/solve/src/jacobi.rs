@@ -23,7 +23,7 @@ pub fn jacobi<T: Transport>(
     let (bands, n) = (response.bands(), b.len());
     let gauge = Gauge::new(transport, response, e);
     let (mut h, mut r) = (vec![0.0; n], vec![0.0; n]);
-    let begun = begin(transport, b, &mut h, bands);
+    let begun = begin(transport, b, &mut h, bands)?;
     let mut info = Info { steps: begun, work: begun as f64, ..Info::default() };
     loop {
         gauge.measure(transport, response, (e, b, &h), &mut r, &mut info);
@@ -33,7 +33,7 @@ pub fn jacobi<T: Transport>(
         for (b, r) in b.iter_mut().zip(&r) {
             *b += r;
         }
-        transport.apply(b, &mut h, bands);
+        transport.apply(b, &mut h, bands)?;
         info.steps += 1;
         info.work += 1.0;
     }

@@ -1,6 +1,6 @@
 //! What Krylov methods share: the image of a field under I − R F, and coefficients of bands that are done.
 
-use crate::{Response, Transport};
+use crate::{Response, SolveError, Transport};
 
 /// A x = x − R F x, with `h` for F x.
 pub(crate) fn image<T: Transport>(
@@ -9,12 +9,13 @@ pub(crate) fn image<T: Transport>(
     x: &[f64],
     h: &mut [f64],
     ax: &mut [f64],
-) {
-    transport.apply(x, h, response.bands());
+) -> Result<(), SolveError> {
+    transport.apply(x, h, response.bands())?;
     response.respond(h, ax);
     for (ax, x) in ax.iter_mut().zip(x) {
         *ax = x - *ax;
     }
+    Ok(())
 }
 
 /// A band that is solved has nothing left to divide.

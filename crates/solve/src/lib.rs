@@ -148,6 +148,9 @@ pub enum SolveError {
         /// What it passes on from its other side.
         transmittance: f64,
     },
+    /// The transport cannot be applied.
+    #[error(transparent)]
+    Transport(Box<dyn std::error::Error + Send + Sync>),
     /// No solver has this name.
     #[error("no solver is called \"{0}\"; there are {known}", known = Solver::names())]
     Unknown(String),

@@ -22,7 +22,7 @@ pub fn neumann<T: Transport>(
     let (bands, n) = (response.bands(), b.len());
     let gauge = Gauge::new(transport, response, e);
     let (mut h, mut layer) = (vec![0.0; n], vec![0.0; n]);
-    let begun = begin(transport, b, &mut h, bands);
+    let begun = begin(transport, b, &mut h, bands)?;
     remainder(response, (e, b, &h), &mut layer);
     let mut info = Info { steps: begun, work: begun as f64, ..Info::default() };
     loop {
@@ -33,7 +33,7 @@ pub fn neumann<T: Transport>(
         for (b, layer) in b.iter_mut().zip(&layer) {
             *b += layer;
         }
-        transport.apply(&layer, &mut h, bands);
+        transport.apply(&layer, &mut h, bands)?;
         response.respond(&h, &mut layer);
         info.steps += 1;
         info.work += 1.0;
@@ -43,13 +43,16 @@ pub fn neumann<T: Transport>(
 /// The light of each bounce by itself: layer 0 is E, layer k what was reflected k times, up to `count` times. The
 /// layers up to the convergence of [`neumann`] sum to its solution.
 ///
+/// # Errors
+/// [`SolveError::Transport`].
+///
 /// ```
 /// use radiosity_solve::{DenseTransport, DiffuseResponse, bounces};
 ///
 /// // A furnace of one element that sees itself: bounce k carries ρ^k.
 /// let sphere = DenseTransport::new(vec![1.0], vec![1.0])?;
 /// let half = DiffuseResponse { reflectance: vec![0.5], bands: 1, reciprocal_area: None };
-/// assert_eq!(bounces(&sphere, &half, &[1.0], 3), [[1.0], [0.5], [0.25], [0.125]]);
+/// assert_eq!(bounces(&sphere, &half, &[1.0], 3)?, [[1.0], [0.5], [0.25], [0.125]]);
 /// # Ok::<(), radiosity_solve::SolveError>(())
 /// ```
 pub fn bounces<T: Transport>(
@@ -57,14 +60,14 @@ pub fn bounces<T: Transport>(
     response: &(impl Response + ?Sized),
     e: &[f64],
     count: usize,
-) -> Vec<Vec<f64>> {
+) -> Result<Vec<Vec<f64>>, SolveError> {
     let mut layers = vec![e.to_vec()];
     let mut h = vec![0.0; e.len()];
     for bounce in 0..count {
         let mut layer = vec![0.0; e.len()];
-        transport.apply(&layers[bounce], &mut h, response.bands());
+        transport.apply(&layers[bounce], &mut h, response.bands())?;
         response.respond(&h, &mut layer);
         layers.push(layer);
     }
-    layers
+    Ok(layers)
 }

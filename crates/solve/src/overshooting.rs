@@ -37,7 +37,7 @@ pub fn overshooting<T: Shoot>(
 ) -> Result<Info, SolveError> {
     let bands = response.bands();
     let ambient = Ambient::new(transport, response, b.len());
-    let (mut shots, mut info) = Shots::new(transport, response, e, b);
+    let (mut shots, mut info) = Shots::new(transport, response, e, b)?;
     for (b, unshot) in b.iter_mut().zip(shots.unshot()) {
         *b += unshot;
     }

@@ -27,7 +27,7 @@ pub fn progressive<T: Shoot>(
     params: &Params,
     mut step: impl FnMut(&[f64], &Info) -> Go,
 ) -> Result<Info, SolveError> {
-    let (mut shots, mut info) = Shots::new(transport, response, e, b);
+    let (mut shots, mut info) = Shots::new(transport, response, e, b)?;
     add(b, shots.unshot());
     loop {
         shots.account(&mut info);
@@ -52,7 +52,7 @@ pub fn shooting_cyclic<T: Shoot>(
     params: &Params,
     mut step: impl FnMut(&[f64], &Info) -> Go,
 ) -> Result<Info, SolveError> {
-    let (mut shots, mut info) = Shots::new(transport, response, e, b);
+    let (mut shots, mut info) = Shots::new(transport, response, e, b)?;
     add(b, shots.unshot());
     let bands = response.bands();
     let unknowns = b.len() / bands;
@@ -87,7 +87,7 @@ pub fn shooting_ambient<T: Shoot>(
 ) -> Result<Info, SolveError> {
     let largest = response.largest();
     let ambient = Ambient::new(transport, response, b.len());
-    let (mut shots, mut info) = Shots::new(transport, response, e, b);
+    let (mut shots, mut info) = Shots::new(transport, response, e, b)?;
     add(b, shots.unshot());
     let mut shown = vec![0.0; b.len()];
     loop {

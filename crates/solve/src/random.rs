@@ -142,7 +142,7 @@ pub(crate) fn repeat<T: Rows>(
     let gauge = Gauge::new(transport, response, e);
     let start = b.to_vec();
     let (mut h, mut r, mut left) = (vec![0.0; b.len()], vec![0.0; b.len()], vec![0.0; b.len()]);
-    let begun = begin(transport, b, &mut h, bands);
+    let begun = begin(transport, b, &mut h, bands)?;
     remainder(response, (e, b, &h), &mut r);
     let mut info = Info { work: begun as f64, ..Info::default() };
     gauge.enter(transport, &r, &mut info);
@@ -172,7 +172,7 @@ pub(crate) fn repeat<T: Rows>(
 
         // A draw reads one of the N² entries; the residual is worth an application.
         info.work += draws as f64 / (unknowns * unknowns) as f64 + 1.0;
-        transport.apply(b, &mut h, bands);
+        transport.apply(b, &mut h, bands)?;
         gauge.measure(transport, response, (e, b, &h), &mut left, &mut info);
         if is_done(b, &info, params, &mut step)? {
             return Ok(info);

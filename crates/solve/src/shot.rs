@@ -5,7 +5,7 @@
 //! one column of F and O(N) memory. The sum shot so far, B − ΔB, has ΔB as its exact residual at all times.
 
 use crate::gauge::{Gauge, begin, energy, remainder};
-use crate::{Info, Response, Shoot, Space, Transport};
+use crate::{Info, Response, Shoot, SolveError, Space, Transport};
 
 /// The unshot radiosity and what a shot needs.
 pub(crate) struct Shots<'a, T, R: ?Sized> {
@@ -21,14 +21,14 @@ pub(crate) struct Shots<'a, T, R: ?Sized> {
 
 impl<'a, T: Shoot, R: Response + ?Sized> Shots<'a, T, R> {
     /// ΔB = E + R F B − B for the start; E for a start from zero, without an application of F.
-    pub fn new(transport: &'a T, response: &'a R, e: &[f64], b: &[f64]) -> (Shots<'a, T, R>, Info) {
+    pub fn new(transport: &'a T, response: &'a R, e: &[f64], b: &[f64]) -> Result<(Shots<'a, T, R>, Info), SolveError> {
         let (mut h, mut unshot) = (vec![0.0; b.len()], vec![0.0; b.len()]);
-        let begun = begin(transport, b, &mut h, response.bands());
+        let begun = begin(transport, b, &mut h, response.bands())?;
         remainder(response, (e, b, &h), &mut unshot);
         let gauge = Gauge::new(transport, response, e);
         let energy = vec![0.0; transport.space().dim()];
         let shots = Shots { transport, response, gauge, unshot, h, reflected: vec![0.0; b.len()], energy };
-        (shots, Info { work: begun as f64, ..Info::default() })
+        Ok((shots, Info { work: begun as f64, ..Info::default() }))
     }
 
     /// The unshot radiosity ΔB.

@@ -20,7 +20,7 @@ pub fn southwell<T: Shoot>(
     params: &Params,
     mut step: impl FnMut(&[f64], &Info) -> Go,
 ) -> Result<Info, SolveError> {
-    let (mut shots, mut info) = Shots::new(transport, response, e, b);
+    let (mut shots, mut info) = Shots::new(transport, response, e, b)?;
     loop {
         shots.account(&mut info);
         if is_done(b, &info, params, &mut step)? {

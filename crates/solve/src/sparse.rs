@@ -147,7 +147,7 @@ impl<V: Copy + Into<f64> + Send + Sync> Transport for SparseTransport<V> {
         &self.space
     }
 
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) -> Result<(), SolveError> {
         h.par_chunks_exact_mut(bands).enumerate().with_min_len(64).for_each(|(i, h)| {
             h.fill(0.0);
             for (j, factor) in self.rows.row(i) {
@@ -156,6 +156,7 @@ impl<V: Copy + Into<f64> + Send + Sync> Transport for SparseTransport<V> {
                 }
             }
         });
+        Ok(())
     }
 
     fn row_sum(&self) -> f64 {

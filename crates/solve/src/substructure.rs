@@ -98,8 +98,9 @@ impl Transport for Substructure {
         &self.space
     }
 
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) -> Result<(), SolveError> {
         self.gather(&self.mean(b, bands), h, bands);
+        Ok(())
     }
 
     fn row_sum(&self) -> f64 {

@@ -1,5 +1,7 @@
 //! What solvers ask of the world: a space, a transport, a response; and the plainest space and response.
 
+use crate::SolveError;
+
 /// A vector space with its own inner product.
 pub trait Space {
     /// Number of unknowns per band.
@@ -17,7 +19,10 @@ pub trait Transport: Sync {
     /// The space of its fields.
     fn space(&self) -> &Self::Space;
     /// Writes F b into `h`; both have `dim × bands` numbers.
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize);
+    ///
+    /// # Errors
+    /// [`SolveError::Transport`] where F is not at hand, as when it is read from a file. What is in `h` then is of no use.
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) -> Result<(), SolveError>;
     /// Labels 0.. of the unknowns such that no row of F reaches from one label to another: rooms that do not see each
     /// other. `None` where that is not known.
     fn parts(&self) -> Option<&[u32]> {

@@ -77,15 +77,17 @@ fn stages(c: &mut Criterion) {
         let trace = |mut table: HitTable| table.extend(&tracer, (&ids, &[]), &receivers, RAYS, &()).map(|()| table);
         b.iter_batched(empty, trace, BatchSize::PerIteration);
     });
-    let mut table = empty();
-    table.extend(&tracer, (&ids, &[]), &receivers, RAYS, &()).unwrap();
-    for bands in [3, 8, 32] {
-        let radiosity: Vec<f64> = (0..bands * n).map(|i| (i % 17) as f64).collect();
-        let mut irradiance = vec![0.0; bands * n];
-        group.throughput(Throughput::Elements((n * RAYS * bands) as u64));
-        group.bench_function(format!("sweep over the table, {bands} bands"), |b| {
-            b.iter(|| table.apply(&radiosity, &mut irradiance, bands));
-        });
+    for (room, place) in [(usize::MAX, "table"), (0, "table in a file")] {
+        let mut table = empty().within(room, std::env::temp_dir());
+        table.extend(&tracer, (&ids, &[]), &receivers, RAYS, &()).unwrap();
+        for bands in [3, 8, 32] {
+            let radiosity: Vec<f64> = (0..bands * n).map(|i| (i % 17) as f64).collect();
+            let mut irradiance = vec![0.0; bands * n];
+            group.throughput(Throughput::Elements((n * RAYS * bands) as u64));
+            group.bench_function(format!("sweep over the {place}, {bands} bands"), |b| {
+                b.iter(|| table.apply(&radiosity, &mut irradiance, bands).unwrap());
+            });
+        }
     }
     group.finish();
 }

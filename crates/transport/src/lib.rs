@@ -5,6 +5,7 @@
 //! through rows: [`Luminaires`] gives their light as a direct column each. Receivers are elements while the equation
 //! is solved and points when an answer is read; both go through the same code ([`Receivers`]).
 
+mod block;
 pub mod direct;
 pub mod exposure;
 pub mod form_factors;
@@ -25,6 +26,7 @@ pub mod rows;
 pub mod view_factors;
 pub mod zones;
 
+pub use block::FileError;
 pub use direct::{Columns, Shadowing};
 pub use exposure::Exposure;
 pub use form_factors::{FormFactorMethod, FormFactorOptions, FormFactors, UnknownFormFactorMethod};
@@ -35,7 +37,7 @@ pub use pair::{Factor, Occlusion, PAIRS, Pair, PairMethod, Unoccluded};
 pub use receivers::{ElementReceivers, PointReceivers, Receivers, ShadedReceivers, Site};
 pub use regions::{RegionOptions, RegionSize, Regions, regions};
 pub use row::{Row, RowFactors};
-pub use rows::{HitTable, IdSpace};
+pub use rows::{ExtendError, HitTable, IdSpace, RowIds};
 pub use view_factors::FactorError;
 pub use zones::{Zone, ZoneExchange, ZoneOptions, zone_exchange};
 

@@ -8,7 +8,11 @@
 //! columns to the table; nothing is traced twice. The elements of a divided cell share its M rays: a receiver sees many
 //! of them and averages their noise out.
 //! It fails, like all sampling, on small bright sources; those go through [`crate::Luminaires`].
+//!
+//! What memory does not hold of the table lies in files ([`HitTable::within`]). Rows are summed from either in the same order, so
+//! that the numbers are the same to the bit.
 
+use crate::block::{Block, Buffer, FileError, Lent, portion};
 use crate::pilot::{AGAIN, Pilot};
 use crate::receivers::Site;
 use crate::{Progress, Receivers, Stopped};
@@ -18,7 +22,8 @@ use radiosity_solve::{AreaSpace, SolveError, SparseTransport, Transport};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
-use std::ops::Range;
+use smallvec::SmallVec;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The one space of ids: surface elements, then sky patches, then nothing.
@@ -149,18 +154,15 @@ impl<R: Receivers> Caster<'_, R> {
     }
 }
 
-/// Rays of one block of columns. Row i is `ids[starts[i]..starts[i + 1]]`, the first half of it from the first half
-/// of the points.
-#[derive(Clone, Debug)]
-struct Block {
-    starts: Vec<usize>,
-    ids: Vec<u32>,
-}
-
-impl Block {
-    fn row(&self, i: usize) -> &[u32] {
-        &self.ids[self.starts[i]..self.starts[i + 1]]
-    }
+/// Why a table has no more columns.
+#[derive(Debug, thiserror::Error)]
+pub enum ExtendError {
+    /// [`Progress`] said so.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// They fit into no memory, and could not be kept in a file.
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 /// Rays of a row where a whole cell gets `columns`: an element gets its share, and at least one ray in each half.
@@ -182,10 +184,16 @@ pub struct HitTable {
     /// Label of each element: elements that see each other, directly or through others, share one.
     parts: Vec<u32>,
     from_afar: bool,
+    /// Bytes of ids that are kept in memory at most, and where the others are.
+    room: usize,
+    folder: PathBuf,
 }
 
 /// The stream of sample points that rows use.
 const ROWS: u32 = 0x0100;
+
+/// Rows that are traced, and summed, by one thread at a time.
+const CHUNK: usize = 256;
 
 impl HitTable {
     /// An empty table for elements of the given areas (m²).
@@ -202,7 +210,14 @@ impl HitTable {
             daylight: vec![Default::default(); n],
             parts,
             from_afar: false,
+            room: usize::MAX,
+            folder: PathBuf::new(),
         }
+    }
+
+    /// The same that keeps no more than `room` bytes of ids in memory, and others in temporary files without a name, in `folder`.
+    pub fn within(self, room: usize, folder: PathBuf) -> HitTable {
+        HitTable { room, folder, ..self }
     }
 
     /// The same whose rows are what elements receive where they are seen from afar: places count by the share of their hemisphere
@@ -222,6 +237,16 @@ impl HitTable {
         &self.daylight
     }
 
+    /// Bytes of ids that are in memory.
+    pub fn bytes_in_memory(&self) -> usize {
+        self.blocks.iter().filter(|block| !block.is_in_file()).map(Block::bytes).sum()
+    }
+
+    /// Bytes of ids that are in files.
+    pub fn bytes_in_files(&self) -> usize {
+        self.blocks.iter().filter(|block| block.is_in_file()).map(Block::bytes).sum()
+    }
+
     /// Bytes of the table with `columns` rays for each of `cells`.
     pub fn bytes(cells: usize, columns: usize) -> usize {
         cells * columns * size_of::<u32>()
@@ -231,7 +256,8 @@ impl HitTable {
     /// nothing where the sky is black.
     ///
     /// # Errors
-    /// [`Stopped`] if `progress` says so; the table is then as it was.
+    /// [`ExtendError::Stopped`] if `progress` says so, [`ExtendError::File`] if the file of rows that memory does not hold fails; the
+    /// table is then as it was.
     pub fn extend(
         &mut self,
         tracer: &Tracer,
@@ -239,12 +265,11 @@ impl HitTable {
         receivers: &impl Receivers,
         columns: usize,
         progress: &impl Progress,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), ExtendError> {
         let n = receivers.len();
         assert_eq!(n, self.space.area.len());
         let columns = columns.next_multiple_of(2);
         let Some(more) = columns.checked_sub(self.columns).filter(|more| *more > 0) else { return Ok(()) };
-        const CHUNK: usize = 256;
         let mut starts = Vec::with_capacity(n + 1);
         let mut end = 0;
         for i in 0..n {
@@ -252,37 +277,41 @@ impl HitTable {
             end += width(more, ids.elements.share(tracer.mesh, i as u32));
         }
         starts.push(end);
-        let mut block = Block { starts, ids: vec![0u32; end] };
+        let room = self.room.saturating_sub(self.bytes_in_memory());
+        let mut block = Block::new(starts, room, &self.folder)?;
         let done = AtomicUsize::new(0);
         let mut daylight = vec![[[0f32; 3]; 2]; n];
         let brightest = sky.iter().map(|l| luminance(*l)).fold(0.0, f32::max).into();
         let caster = Caster { tracer, ids, sky, receivers, from_afar: self.from_afar };
-        let chunks = split_rows(&mut block.ids, &block.starts, CHUNK).into_par_iter();
-        chunks.zip(daylight.par_chunks_mut(CHUNK)).try_for_each(|((rows, mut ids_left), daylight)| {
+        let chunks = block.writers(CHUNK).into_par_iter().zip(daylight.par_chunks_mut(CHUNK));
+        chunks.try_for_each(|(mut writer, daylight)| -> Result<(), ExtendError> {
+            let rows = writer.rows.clone();
             let mut pilot = Pilot::default();
             pilot.begin(rows.len(), if sky.is_empty() { 0 } else { more as u32 }, brightest);
             for (k, i) in rows.clone().enumerate() {
-                let row;
-                (row, ids_left) = ids_left.split_at_mut(block.starts[i + 1] - block.starts[i]);
-                caster.trace((i, self.traced[i] / 2), row, k, &mut pilot);
-                // Neighbouring ids lie in the same cache lines when the row is read back in order.
-                let half = row.len() / 2;
-                row[..half].sort_unstable();
-                row[half..].sort_unstable();
+                writer.write(i, |row| {
+                    caster.trace((i, self.traced[i] / 2), row, k, &mut pilot);
+                    // Neighbouring ids lie in the same cache lines when the row is read back in order.
+                    let half = row.len() / 2;
+                    row[..half].sort_unstable();
+                    row[half..].sort_unstable();
+                })?;
             }
+            writer.flush()?;
             if !sky.is_empty() {
                 for (k, (i, daylight)) in rows.clone().zip(daylight).enumerate() {
                     *daylight = caster.daylight((i, self.traced[i] / 2), k, &mut pilot);
                 }
             }
-            progress.step(done.fetch_add(rows.len(), Ordering::Relaxed) + rows.len(), n).then_some(()).ok_or(Stopped)
+            let done = done.fetch_add(rows.len(), Ordering::Relaxed) + rows.len();
+            if progress.step(done, n) { Ok(()) } else { Err(Stopped.into()) }
         })?;
-        self.join_parts(&block);
-        for (i, starts) in block.starts.windows(2).enumerate() {
-            let more = (starts[1] - starts[0]) as u32;
+        self.join_parts(&block)?;
+        for (i, found) in daylight.iter().enumerate() {
+            let more = block.width(i) as u32;
             self.traced[i] += more;
             let share = more as f32 / self.traced[i] as f32;
-            for (mean, new) in self.daylight[i].iter_mut().flatten().zip(daylight[i].as_flattened()) {
+            for (mean, new) in self.daylight[i].iter_mut().flatten().zip(found.as_flattened()) {
                 *mean += share * (new - *mean);
             }
         }
@@ -292,7 +321,7 @@ impl HitTable {
     }
 
     /// Joins the labels of elements that rows connect, and numbers them anew from 0.
-    fn join_parts(&mut self, block: &Block) {
+    fn join_parts(&mut self, block: &Block) -> Result<(), FileError> {
         let n = self.parts.len();
         // Labels as a forest: each points to an element of its set with a number no larger than its own.
         let mut first = vec![u32::MAX; n];
@@ -309,14 +338,20 @@ impl HitTable {
             }
             i
         }
-        for i in 0..n {
-            let mut own = root(&mut parent, i as u32);
-            for &id in block.row(i).iter().filter(|id| (**id as usize) < n) {
-                let other = root(&mut parent, id);
-                let (low, high) = (own.min(other), own.max(other));
-                parent[high as usize] = low;
-                own = low;
+        let (mut buffer, mut rest) = (Buffer::default(), 0..n);
+        while !rest.is_empty() {
+            let rows = portion(std::slice::from_ref(block), &rest);
+            let lent = block.lend(&rows, &mut buffer)?;
+            for i in rows.clone() {
+                let mut own = root(&mut parent, i as u32);
+                for &id in lent.row(i).iter().filter(|id| (**id as usize) < n) {
+                    let other = root(&mut parent, id);
+                    let (low, high) = (own.min(other), own.max(other));
+                    parent[high as usize] = low;
+                    own = low;
+                }
             }
+            rest.start = rows.end;
         }
         let mut next = 0;
         let mut number = vec![u32::MAX; n];
@@ -328,37 +363,144 @@ impl HitTable {
             }
             self.parts[i] = number[root];
         }
+        Ok(())
+    }
+
+    /// Fills `out`, `width` numbers a row, by what `fill` makes of the ids of each row.
+    fn each_row<T: Send>(
+        &self,
+        out: &mut [T],
+        width: usize,
+        fill: impl Fn(RowIds, &mut [T]) + Sync,
+    ) -> Result<(), FileError> {
+        let chunks = out.par_chunks_mut(CHUNK * width).enumerate();
+        chunks.try_for_each_init(Vec::new, |buffers: &mut Vec<Buffer>, (chunk, mut out)| {
+            buffers.resize_with(self.blocks.len(), Buffer::default);
+            let first = chunk * CHUNK;
+            let mut rest = first..first + out.len() / width;
+            while !rest.is_empty() {
+                let rows = portion(&self.blocks, &rest);
+                let lent = self.blocks.iter().zip(&mut *buffers).map(|(block, buffer)| block.lend(&rows, buffer));
+                let lent = lent.collect::<Result<SmallVec<[Lent; 8]>, FileError>>()?;
+                for i in rows.clone() {
+                    let own;
+                    (own, out) = out.split_at_mut(width);
+                    fill(RowIds { i, lent: &lent }, own);
+                }
+                rest.start = rows.end;
+            }
+            Ok(())
+        })
+    }
+
+    /// What `of` makes of each row.
+    ///
+    /// # Errors
+    /// [`FileError`] where rows are in a file that cannot be read.
+    pub fn map_rows<T: Clone + Default + Send>(&self, of: impl Fn(RowIds) -> T + Sync) -> Result<Vec<T>, FileError> {
+        let mut all = vec![T::default(); self.space.area.len()];
+        self.each_row(&mut all, 1, |row, own| own[0] = of(row))?;
+        Ok(all)
     }
 
     /// Mean of `values` (by id) over each row: h_i = (1/M_i) Σ_m values[id(i, m)].
-    pub fn rows_mean(&self, values: &[[f32; 4]]) -> Vec<[f32; 4]> {
-        self.halves(values).into_iter().map(|[a, b]| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect()
+    ///
+    /// # Errors
+    /// As [`HitTable::map_rows`].
+    pub fn rows_mean(&self, values: &[[f32; 4]]) -> Result<Vec<[f32; 4]>, FileError> {
+        let halves = self.halves(values)?;
+        Ok(halves.into_iter().map(|[a, b]| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect())
     }
 
     /// The same for the two halves of each row.
-    pub fn halves(&self, values: &[[f32; 4]]) -> Vec<[[f32; 4]; 2]> {
+    ///
+    /// # Errors
+    /// As [`HitTable::map_rows`].
+    pub fn halves(&self, values: &[[f32; 4]]) -> Result<Vec<[[f32; 4]; 2]>, FileError> {
         assert_eq!(values.len(), self.all_ids);
-        let n = self.space.area.len();
-        (0..n)
-            .into_par_iter()
-            .with_min_len(256)
-            .map(|i| {
-                let share = 2.0 / self.traced[i].max(1) as f32;
-                self.row(i, values).map(|sum| sum.map(|x| x * share))
-            })
-            .collect()
+        self.map_rows(|row| {
+            let share = 2.0 / self.traced[row.i].max(1) as f32;
+            row.sums(values).map(|sum| sum.map(|x| x * share))
+        })
     }
 
+    /// F b among the elements for up to W bands from `first` on; returns how many.
+    fn sweep<const W: usize>(&self, b: &[f64], h: &mut [f64], bands: usize, first: usize) -> Result<usize, FileError> {
+        let n = self.space.area.len();
+        let count = (bands - first).min(W);
+        let mut values = vec![[0f32; W]; self.all_ids];
+        values.par_iter_mut().zip(b.par_chunks_exact(bands)).with_min_len(4096).for_each(|(value, b)| {
+            for (value, b) in value.iter_mut().zip(&b[first..first + count]) {
+                *value = *b as f32;
+            }
+        });
+        self.each_row(&mut h[..n * bands], bands, |row, h| {
+            let share = 1.0 / f64::from(self.traced[row.i].max(1));
+            let [a, c] = row.sums(&values);
+            for (k, h) in h[first..first + count].iter_mut().enumerate() {
+                *h = (f64::from(a[k]) + f64::from(c[k])) * share;
+            }
+        })?;
+        Ok(count)
+    }
+
+    /// The rows among elements as a stored matrix, for solvers that need more than to apply it.
+    ///
+    /// # Errors
+    /// [`SolveError::Transport`] as [`HitTable::map_rows`]; another [`SolveError`] if an area is no finite number.
+    pub fn matrix(&self) -> Result<SparseTransport<f64>, SolveError> {
+        let n = self.space.area.len();
+        let rows = self.map_rows(|row| {
+            let mut ids: Vec<u32> = row.ids().filter(|id| (*id as usize) < n).collect();
+            ids.sort_unstable();
+            let share = 1.0 / f64::from(self.traced[row.i].max(1));
+            let entries = ids.chunk_by(|a, b| a == b).map(|same| (same[0], share * same.len() as f64));
+            entries.collect::<Vec<_>>()
+        });
+        let rows = rows.map_err(|error| SolveError::Transport(error.into()))?;
+        let mut starts = vec![0];
+        let (mut columns, mut values) = (Vec::new(), Vec::new());
+        for row in rows {
+            for (column, value) in row {
+                columns.push(column);
+                values.push(value);
+            }
+            starts.push(columns.len());
+        }
+        SparseTransport::new(self.space.area.clone(), starts, columns, values)
+    }
+}
+
+/// The ids of a row of the table, all of the same weight.
+#[derive(Clone, Copy)]
+pub struct RowIds<'a> {
+    i: usize,
+    lent: &'a [Lent<'a>],
+}
+
+impl<'a> RowIds<'a> {
+    /// The ids.
+    pub fn ids(&self) -> impl Iterator<Item = u32> + 'a {
+        self.blocks().flatten().copied()
+    }
+
+    /// The same block by block.
     #[inline]
-    fn row<const W: usize>(&self, i: usize, values: &[[f32; W]]) -> [[f32; W]; 2] {
+    fn blocks(&self) -> impl Iterator<Item = &'a [u32]> + 'a {
+        let RowIds { i, lent } = *self;
+        lent.iter().map(move |lent| lent.row(i))
+    }
+
+    /// Sums of `values` over the two halves.
+    #[inline]
+    fn sums<const W: usize>(&self, values: &[[f32; W]]) -> [[f32; W]; 2] {
         let mut sums = [[0f32; W]; 2];
         let add = |sum: &mut [f32; W], id: u32| {
             for (sum, value) in sum.iter_mut().zip(&values[id as usize]) {
                 *sum += value;
             }
         };
-        for block in &self.blocks {
-            let row = block.row(i);
+        for row in self.blocks() {
             let (first, second) = row.split_at(row.len() / 2);
             let [a, c] = &mut sums;
             if W <= 16 {
@@ -375,71 +517,6 @@ impl HitTable {
         }
         sums
     }
-
-    /// F b among the elements for up to W bands from `first` on; returns how many.
-    fn sweep<const W: usize>(&self, b: &[f64], h: &mut [f64], bands: usize, first: usize) -> usize {
-        let n = self.space.area.len();
-        let count = (bands - first).min(W);
-        let mut values = vec![[0f32; W]; self.all_ids];
-        values.par_iter_mut().zip(b.par_chunks_exact(bands)).with_min_len(4096).for_each(|(value, b)| {
-            for (value, b) in value.iter_mut().zip(&b[first..first + count]) {
-                *value = *b as f32;
-            }
-        });
-        h.par_chunks_exact_mut(bands).with_min_len(256).enumerate().take(n).for_each(|(i, h)| {
-            let share = 1.0 / f64::from(self.traced[i].max(1));
-            let [a, c] = self.row(i, &values);
-            for (k, h) in h[first..first + count].iter_mut().enumerate() {
-                *h = (f64::from(a[k]) + f64::from(c[k])) * share;
-            }
-        });
-        count
-    }
-
-    /// The rows among elements as a stored matrix, for solvers that need more than to apply it.
-    ///
-    /// # Errors
-    /// [`SolveError`] if an area is no finite number.
-    pub fn matrix(&self) -> Result<SparseTransport<f64>, SolveError> {
-        let n = self.space.area.len();
-        let rows: Vec<Vec<(u32, f64)>> = (0..n)
-            .into_par_iter()
-            .map(|i| {
-                let mut ids: Vec<u32> = self.row_ids(i).filter(|id| (*id as usize) < n).collect();
-                ids.sort_unstable();
-                let share = 1.0 / f64::from(self.traced[i].max(1));
-                ids.chunk_by(|a, b| a == b).map(|same| (same[0], share * same.len() as f64)).collect()
-            })
-            .collect();
-        let mut starts = vec![0];
-        let (mut columns, mut values) = (Vec::new(), Vec::new());
-        for row in rows {
-            for (column, value) in row {
-                columns.push(column);
-                values.push(value);
-            }
-            starts.push(columns.len());
-        }
-        SparseTransport::new(self.space.area.clone(), starts, columns, values)
-    }
-
-    /// The ids of a row, all of the same weight.
-    pub fn row_ids(&self, i: usize) -> impl Iterator<Item = u32> + '_ {
-        self.blocks.iter().flat_map(move |block| block.row(i).iter().copied())
-    }
-}
-
-/// Cuts `ids` into chunks of `chunk` rows, each with the range of its rows.
-fn split_rows<'a>(mut ids: &'a mut [u32], starts: &[usize], chunk: usize) -> Vec<(Range<usize>, &'a mut [u32])> {
-    let n = starts.len() - 1;
-    let mut chunks = Vec::with_capacity(n.div_ceil(chunk));
-    for first in (0..n).step_by(chunk) {
-        let end = (first + chunk).min(n);
-        let (own, rest) = ids.split_at_mut(starts[end] - starts[first]);
-        chunks.push((first..end, own));
-        ids = rest;
-    }
-    chunks
 }
 
 impl Transport for HitTable {
@@ -455,16 +532,18 @@ impl Transport for HitTable {
 
     /// F b among the elements; sky and nothing give zero here. An entry of the table is read once for up to 32 bands: many right-hand
     /// sides at once, such as columns of lights, are bands of one field.
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) -> Result<(), SolveError> {
         let mut first = 0;
         while first < bands {
-            first += match bands - first {
+            let swept = match bands - first {
                 ..=4 => self.sweep::<4>(b, h, bands, first),
                 5..=8 => self.sweep::<8>(b, h, bands, first),
                 9..=16 => self.sweep::<16>(b, h, bands, first),
                 _ => self.sweep::<32>(b, h, bands, first),
             };
+            first += swept.map_err(|error| SolveError::Transport(error.into()))?;
         }
+        Ok(())
     }
 }
 
@@ -474,9 +553,8 @@ mod tests {
     use crate::{ElementReceivers, Exposure};
     use radiosity_scene::{Material, Mesh, Scene, Sky};
 
-    /// A floor, half of it 1 cm beneath a board, under an even sky: over its area it sees half of that, and the open half all of it.
-    #[test]
-    fn from_afar_the_open_half_is_seen() {
+    /// Hands out the tracer and the elements of a floor, half of it 1 cm beneath a board, under an even sky.
+    fn on_a_floor<T>(size: f64, of: impl FnOnce(&Tracer, &IdSpace, &ElementReceivers, &[f64]) -> T) -> T {
         let mut scene = Scene { sky: Sky::Uniform([1.0; 3]), ..Scene::default() };
         scene.materials = vec![Material::default(), Material { double_sided: true, ..Material::default() }];
         let quad = |low: DVec3, x: f64| [low, low + DVec3::X * x, low + DVec3::new(x, 1.0, 0.0), low + DVec3::Y];
@@ -484,25 +562,90 @@ mod tests {
         scene.add_quad("board", 1, quad(DVec3::new(-1.0, 0.0, 0.01), 1.5));
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let elements = Elements::new(&scene, &mesh, 10.0);
+        let elements = Elements::new(&scene, &mesh, size);
         let sky = SkyPatches::new(&scene.sky, scene.up.direction());
         let ids = IdSpace { elements: &elements, sky };
         let exposure = Exposure::default();
         let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
         let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
-        let seen = |table: HitTable| {
-            let mut table = table;
-            table.extend(&tracer, (&ids, &[]), &receivers, 1024, &()).unwrap();
-            let mut sky = vec![[0f32; 4]; ids.len()];
-            sky[elements.len()..ids.len() - 1].fill([1.0; 4]);
-            // The floor is two triangles.
-            let of = |i: usize| area[i] * f64::from(table.rows_mean(&sky)[i][0]);
-            of(0) + of(1)
-        };
-        let whole = seen(HitTable::new(area.clone(), &ids));
-        let open = seen(HitTable::new(area.clone(), &ids).from_afar());
+        of(&tracer, &ids, &receivers, &area)
+    }
+
+    /// Over its area the floor sees half of the sky, and its open half all of it.
+    #[test]
+    fn from_afar_the_open_half_is_seen() {
+        let [whole, open] = on_a_floor(10.0, |tracer, ids, receivers, area| {
+            let table = || HitTable::new(area.to_vec(), ids);
+            [table(), table().from_afar()].map(|mut table| {
+                table.extend(tracer, (ids, &[]), receivers, 1024, &()).unwrap();
+                let mut sky = vec![[0f32; 4]; ids.len()];
+                sky[ids.elements.len()..ids.len() - 1].fill([1.0; 4]);
+                // The floor is two triangles.
+                let of = |i: usize| area[i] * f64::from(table.rows_mean(&sky).unwrap()[i][0]);
+                of(0) + of(1)
+            })
+        });
         assert!((whole - 0.5).abs() < 0.02, "{whole}");
         // Few tries leave some rays beneath the board of a triangle that has three quarters there.
         assert!(open > 0.9, "{open}");
+    }
+
+    /// A table in memory, one whose second columns are in a file and one whose columns all are give the same bits, with one thread
+    /// and with two. Of 1,024 rays a row, as many rows are read at a time as make no whole number of times those of a thread.
+    #[test]
+    fn rows_in_files_give_the_same_bits() {
+        let run = |threads: usize, room: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let found = || {
+                on_a_floor(0.11, |tracer, ids, receivers, area| {
+                    let n = area.len();
+                    assert!(n > 2 * CHUNK && !n.is_multiple_of(CHUNK), "{n}");
+                    let mut table = HitTable::new(area.to_vec(), ids).within(room, std::env::temp_dir());
+                    let sky = ids.sky.radiosity(&Sky::Uniform([1.0; 3]));
+                    for columns in [16, 1024] {
+                        table.extend(tracer, (ids, &sky), receivers, columns, &()).unwrap();
+                    }
+                    let light = |i: usize| ((7 * i) % 97) as f64 / 31.0;
+                    let b: Vec<f64> = (0..37 * n).map(light).collect();
+                    let (mut h, mut by_matrix) = (vec![0.0; 37 * n], vec![0.0; n]);
+                    table.apply(&b, &mut h, 37).unwrap();
+                    table.matrix().unwrap().apply(&b[..n], &mut by_matrix, 1).unwrap();
+                    let values: Vec<[f32; 4]> = (0..ids.len()).map(|i| [light(i) as f32; 4]).collect();
+                    let halves = table.halves(&values).unwrap();
+                    let single = halves.as_flattened().as_flattened().iter();
+                    let single = single.chain(table.daylight().as_flattened().as_flattened()).map(|x| f64::from(*x));
+                    let numbers: Vec<u64> = h.into_iter().chain(by_matrix).chain(single).map(f64::to_bits).collect();
+                    let ids = table.map_rows(|row| row.ids().collect::<Vec<u32>>()).unwrap();
+                    assert_eq!(table.bytes_in_memory() + table.bytes_in_files(), HitTable::bytes(n, 1024));
+                    (table.bytes_in_memory(), (numbers, ids, table.parts().unwrap().to_vec()))
+                })
+            };
+            pool.install(found)
+        };
+        let (whole, memory) = run(1, usize::MAX);
+        for (threads, room, held) in
+            [(2, usize::MAX, whole), (1, 0, 0), (2, 0, 0), (1, whole / 2, whole / 64), (2, whole / 2, whole / 64)]
+        {
+            let (in_memory, found) = run(threads, room);
+            assert_eq!(in_memory, held, "{threads} threads, {room} bytes");
+            assert!(found == memory, "{threads} threads, {room} bytes");
+        }
+    }
+
+    /// Where there is no place for a file the table says so, and is as it was.
+    #[test]
+    fn a_file_that_cannot_be_is_an_error() {
+        on_a_floor(0.1, |tracer, ids, receivers, area| {
+            let nowhere = std::env::temp_dir().join("there is no such folder");
+            let mut table = HitTable::new(area.to_vec(), ids).within(area.len() * 100, nowhere.clone());
+            table.extend(tracer, (ids, &[]), receivers, 16, &()).unwrap();
+            let Err(ExtendError::File(error)) = table.extend(tracer, (ids, &[]), receivers, 64, &()) else {
+                panic!("written")
+            };
+            assert_eq!((&error.folder, error.bytes), (&nowhere, HitTable::bytes(area.len(), 48)));
+            assert!(error.to_string().contains("no such folder"), "{error}");
+            assert_eq!((table.columns(), table.bytes_in_files()), (16, 0));
+            assert!(table.rows_mean(&vec![[1.0; 4]; ids.len()]).unwrap().iter().all(|sum| sum[0] == 1.0));
+        });
     }
 }

@@ -67,7 +67,7 @@ fn cost(size: f64) -> Cost {
     let ids = IdSpace { elements: &elements, sky: SkyPatches::new(&Sky::default(), DVec3::Y) };
     let mut table = HitTable::new(area, &ids);
     table.extend(&tracer, (&ids, &[]), &receivers, RAYS, &()).unwrap();
-    let rays: usize = (0..n).map(|i| table.row_ids(i).count()).sum();
+    let rays: usize = table.map_rows(|row| row.ids().count()).unwrap().into_iter().sum();
 
     // The ceiling gives off light.
     let e: Vec<f64> = (0..n as u32).map(|e| f64::from(elements.normal(&mesh, e).y < -0.9)).collect();
@@ -129,7 +129,7 @@ fn bands_of_any_number_come_out_as_alone() {
     let alone: Vec<Vec<f64>> = (0..70)
         .map(|band| {
             let (b, mut h): (Vec<f64>, _) = ((0..n).map(|i| light(i, band)).collect(), vec![0.0; n]);
-            table.apply(&b, &mut h, 1);
+            table.apply(&b, &mut h, 1).unwrap();
             h
         })
         .collect();
@@ -137,7 +137,7 @@ fn bands_of_any_number_come_out_as_alone() {
     for bands in (1..=34).chain([64, 70]) {
         let b: Vec<f64> = (0..n * bands).map(|k| light(k / bands, k % bands)).collect();
         let mut h = vec![0.0; n * bands];
-        table.apply(&b, &mut h, bands);
+        table.apply(&b, &mut h, bands).unwrap();
         for (k, h) in h.iter().enumerate() {
             assert_eq!(h.to_bits(), alone[k % bands][k / bands].to_bits(), "{bands} bands, number {k}");
         }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use radiosity_scene::{Enclosure, Facet, Illuminant, SpectralBands};
-use radiosity_solve::{AreaSpace, DiffuseResponse, Go, Params, Solver, Transport, solve_operator};
+use radiosity_solve::{AreaSpace, DiffuseResponse, Go, Params, SolveError, Solver, Transport, solve_operator};
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors, Progress};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -16,9 +16,9 @@ impl<T: Transport<Space = AreaSpace>> Transport for Counted<T> {
         self.0.space()
     }
 
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) -> Result<(), SolveError> {
         self.1.fetch_add(1, Ordering::Relaxed);
-        self.0.apply(b, h, bands);
+        self.0.apply(b, h, bands)
     }
 }
 

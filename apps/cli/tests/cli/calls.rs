@@ -36,7 +36,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("bake --texels-per-metre 104 --memory 8M --element-size 0.3 --error 50%", "ask for fewer per metre"),
         (
             "bake --element-size 1e-9",
-            "3.8e18 elements need 9.4e14 MB at least; 4.0 GB are allowed (use 0.00053 or more",
+            "3.8e18 elements need 1.9e15 MB at least; 4.0 GB are allowed (use 0.00075 or more",
         ),
         ("render -o a.png --element-size 1e-9", "elements need"),
         ("measure --points good.csv --element-size 1e-9", "elements need"),

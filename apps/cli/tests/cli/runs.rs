@@ -86,6 +86,31 @@ fn an_interrupt_ends_a_long_run_at_once_and_leaves_nothing() {
     assert_eq!(room.read("a.glb"), b"precious");
 }
 
+/// Rays that the memory does not hold lie in a temporary file: the same bytes, or an error where there is no place for it.
+#[test]
+fn rays_beyond_the_memory_lie_in_a_temporary_file() {
+    let room = Room::new("memory");
+    let call = |output: &str, memory: &str| {
+        let call = ["render", "-v", "--memory", memory, "-o", output, "--rounds", "0"];
+        let mut command = room.command(call.iter().chain(&COARSE));
+        command.env("TMPDIR", &room.0).env("TMP", &room.0);
+        command
+    };
+    let run = |output: &str, memory: &str| Run::of(call(output, memory).output().unwrap());
+    let (whole, little) = (run("a.exr", "1G"), run("b.exr", "700K"));
+    assert_eq!((whole.code, little.code), (Some(0), Some(0)), "{whole:?} {little:?}");
+    assert!(!whole.err.contains("temporary file") && little.err.contains("temporary file in "), "{}", little.err);
+    assert!(room.read("a.exr") == room.read("b.exr"));
+
+    let nowhere = room.0.join("nowhere");
+    let failed = Run::of(call("c.exr", "700K").env("TMPDIR", &nowhere).env("TMP", &nowhere).output().unwrap());
+    assert_eq!(failed.code, Some(1), "{failed:?}");
+    for said in ["KB that memory does not hold", "nowhere: ", "allow more memory, or set"] {
+        assert!(failed.err.contains(said) && !failed.err.contains("panicked"), "{}", failed.err);
+    }
+    assert_eq!(room.names(), ["a.exr", "b.exr"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_answer_that_nobody_can_read_is_a_failure_and_no_panic() {

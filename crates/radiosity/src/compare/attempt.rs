@@ -158,8 +158,7 @@ fn by_rays(
     let bytes = HitTable::bytes(elements.cells(), rays) + elements.len() * size_of::<Bands>();
 
     let mut factors = FormFactors { areas: area.clone(), starts: vec![0], ..FormFactors::default() };
-    for i in 0..elements.len() {
-        let mut hits: Vec<u32> = table.row_ids(i).collect();
+    for mut hits in table.map_rows(|row| row.ids().collect::<Vec<u32>>())? {
         let share = 1.0 / hits.len() as f64;
         hits.sort_unstable();
         for same in hits.chunk_by(|a, b| a == b).filter(|same| (same[0] as usize) < elements.len()) {

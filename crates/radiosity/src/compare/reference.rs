@@ -93,7 +93,7 @@ impl Reference {
         let solver = if problem.sheets.is_empty() { Solver::Cg } else { Solver::Gmres };
         let info = solve(solver, &transport, &response, &problem.emission, &mut radiosity, &params, step)?;
         let mut gathered = vec![0.0; radiosity.len()];
-        transport.apply(&radiosity, &mut gathered, 3);
+        transport.apply(&radiosity, &mut gathered, 3)?;
         let irradiance = problem.irradiance(&gathered);
         let total: f64 = problem.area.iter().sum();
         let flux: f64 = irradiance.iter().zip(&problem.area).map(|(h, area)| area * bright(*h)).sum();

@@ -162,7 +162,7 @@ fn solved(
         Err(other) => return Err(Error::Solve(other)),
     }
     let mut h = vec![0.0; b.len()];
-    transport.apply(&b, &mut h, 3);
+    transport.apply(&b, &mut h, 3)?;
     if let Some(Apart { carried, direct }) = apart {
         for k in 0..b.len() {
             b[k] += carried[k];

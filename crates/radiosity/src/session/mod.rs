@@ -248,7 +248,7 @@ impl Session {
         let (needed, allowed) = (bytes(elements, rays, lights.min(MOST_COLUMNS)) + of_edges, options.memory);
         if needed > allowed {
             let least = bytes(Live::count(&scene, f64::INFINITY), 4, lights.min(MOST_COLUMNS)) + of_edges;
-            return Err(Error::Memory { elements, rays: rays as usize, needed, allowed, least });
+            return Err(Error::Memory { elements, rays: Some(rays as usize), needed, allowed, least });
         }
 
         let live = Live::new(Arc::new(scene), size, most);

@@ -1,8 +1,8 @@
 //! Where the light goes: what comes in, what is absorbed and what leaves, and by how much they miss each other.
 
 use super::Solution;
+use crate::Error;
 use radiosity_scene::Bands;
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// Where the light goes, in lumens (or watts) per band.
@@ -26,7 +26,10 @@ pub struct Balance {
 
 impl Solution<'_> {
     /// Where the light goes, from the rows as they are.
-    pub fn balance(&self) -> Balance {
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn balance(&self) -> Result<Balance, Error> {
         let n = self.elements.len();
         let (first_sky, nothing) = (n as u32, (self.values.len() - 1) as u32);
         let radiosity = self.radiosity();
@@ -42,18 +45,15 @@ impl Solution<'_> {
                 }
             }
         }
-        let shares: Vec<[f64; 2]> = (0..n)
-            .into_par_iter()
-            .map(|i| {
-                let (mut sky, mut back, mut m) = (0u32, 0u32, 0.0);
-                for id in self.table.row_ids(i) {
-                    m += 1.0;
-                    back += u32::from(id == nothing);
-                    sky += u32::from(id >= first_sky && id != nothing);
-                }
-                [f64::from(sky) / m, f64::from(back) / m]
-            })
-            .collect();
+        let shares: Vec<[f64; 2]> = self.table.map_rows(|row| {
+            let (mut sky, mut back, mut m) = (0u32, 0u32, 0.0);
+            for id in row.ids() {
+                m += 1.0;
+                back += u32::from(id == nothing);
+                sky += u32::from(id >= first_sky && id != nothing);
+            }
+            [f64::from(sky) / m, f64::from(back) / m]
+        })?;
         let from_sky = self.daylight();
         for i in 0..n {
             for band in 0..3 {
@@ -77,6 +77,6 @@ impl Solution<'_> {
         });
         let [emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs] =
             sums.map(|s| s.map(|x| x as f32));
-        Balance { emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs, defect }
+        Ok(Balance { emitted, from_point_lights, from_sky, absorbed, escaped, lost_on_backs, defect })
     }
 }

@@ -8,7 +8,7 @@ mod options;
 
 pub use balance::Balance;
 pub use options::SolveOptions;
-pub(crate) use options::{LEAST_RAYS, element_size};
+pub(crate) use options::element_size;
 
 use crate::Error;
 use crate::displayed::{Screen, Shown};
@@ -16,10 +16,10 @@ use crate::division::{Optics, Sheets, divided};
 use crate::equation::{self, Matrix, Task, single};
 use crate::footprint::{self, least_memory};
 use crate::monitor::{Begin, Hurry, Monitor, Stages, Watch, is_over};
-use radiosity_scene::{Bands, Elements, SkyPatches};
+use radiosity_scene::{Bands, Elements, SkyPatches, size};
 use radiosity_solve::{DiffuseResponse, Info};
 use radiosity_trace::Tracer;
-use radiosity_transport::{Columns, ElementReceivers, Exposure, Gather, HitTable, IdSpace, Luminaires};
+use radiosity_transport::{Columns, ElementReceivers, Exposure, ExtendError, Gather, HitTable, IdSpace, Luminaires};
 
 /// Rays per cell that are traced whether or not there is time, where elements are [`FEW`]: a tenth of a second for a room.
 const FIRST_RAYS: usize = 16;
@@ -69,7 +69,7 @@ impl<'a> Solution<'a> {
     ///
     /// # Errors
     /// [`Error::Memory`] and [`Error::Elimination`] before anything large is allocated; [`Error::Reciprocity`];
-    /// [`Error::Stopped`]; [`Error::Solve`].
+    /// [`Error::Stopped`]; [`Error::Solve`]; [`Error::File`].
     pub fn new(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
         let mut solution = Solution::begin(tracer, options, monitor)?;
         solution.refine(options.rays, monitor)?;
@@ -101,7 +101,8 @@ impl<'a> Solution<'a> {
             return Err(memory_error(tracer, Elements::count(scene, mesh, element_size), needed, options));
         }
         let needed = |elements: &Elements| {
-            footprint::solution(tracer, (elements.len(), elements.cells()), options.rays, Luminaires::most(scene))
+            let solution = footprint::solution(tracer, elements.len(), Luminaires::most(scene));
+            solution.saturating_add(options.stored(elements.cells()))
         };
         let begin = |elements: usize| Begin { monitor, is_soon: elements <= FEW };
         let elements = stages.time(monitor, "elements", || {
@@ -145,7 +146,8 @@ impl<'a> Solution<'a> {
         })?;
 
         let id_space = IdSpace { elements: &elements, sky };
-        let table = HitTable::new(area.clone(), &id_space);
+        let room = options.memory - needed;
+        let table = HitTable::new(area.clone(), &id_space).within(room, std::env::temp_dir());
         let table = if options.looked_up { table.from_afar() } else { table };
         let mut values = vec![[0f32; 4]; id_space.len()];
         for (value, l) in values[elements.len()..].iter_mut().zip(sky.radiosity(&scene.sky)) {
@@ -217,20 +219,21 @@ impl<'a> Solution<'a> {
 
     /// Bytes that may be taken beside the solution and what it is made of.
     pub fn memory_allowed(&self) -> usize {
-        self.options.memory.saturating_sub(self.needed(self.rays()))
+        self.options.memory.saturating_sub(self.needed(self.rays())).saturating_sub(self.table.bytes_in_memory())
     }
 
-    /// Bytes of the solution with so many rays, and of what it is made of.
+    /// Bytes of the solution with so many rays, and of what it is made of, as far as they cannot lie in a file.
     fn needed(&self, rays: usize) -> usize {
-        let counts = (self.elements.len(), self.elements.cells());
-        footprint::solution(self.tracer, counts, rays, Luminaires::most(self.tracer.scene))
+        let solution = footprint::solution(self.tracer, self.elements.len(), Luminaires::most(self.tracer.scene));
+        solution.saturating_add(SolveOptions { rays, ..self.options }.stored(self.elements.cells()))
     }
 
     /// Bytes that the scene, its mesh and tree and a solution with these options take, as far as that is known before the
-    /// elements are made: none of them divided, without what each light gives to each.
+    /// elements are made: none of them divided. Rays may lie in a file and do not count.
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
         let cells = Elements::count(tracer.scene, tracer.mesh, element_size(tracer, options));
-        footprint::solution(tracer, (cells, cells), options.rays, 0)
+        let solution = footprint::solution(tracer, cells, Luminaires::most(tracer.scene));
+        solution.saturating_add(options.stored(cells))
     }
 
     /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
@@ -260,7 +263,7 @@ impl<'a> Solution<'a> {
     /// with what it has: fewer rays, perhaps ([`Solution::rays`]), and the iterate by then ([`Solution::info`]).
     ///
     /// # Errors
-    /// As [`Solution::new`]; [`Error::Displayed`], [`Error::Tolerance`], [`Error::Time`].
+    /// As [`Solution::new`]; [`Error::Displayed`], [`Error::Tolerance`], [`Error::Time`], [`Error::File`].
     pub fn refine(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
         let needed = self.needed(rays);
         if needed > self.options.memory {
@@ -303,26 +306,35 @@ impl<'a> Solution<'a> {
         let scene_sky = &self.tracer.scene.sky;
         let sky = if scene_sky.is_black() { Vec::new() } else { self.sky.radiosity(scene_sky) };
         let (tracer, table) = (self.tracer, &mut self.table);
-        self.stages.time(monitor, "rays", || {
+        let in_files = table.bytes_in_files();
+        self.stages.time(monitor, "rays", || -> Result<(), Error> {
             if monitor.deadline().is_none() {
                 return Ok(table.extend(tracer, (&ids, &sky), &receivers, rays, &Watch(monitor))?);
             }
             if table.columns() == 0 {
                 let begin = Begin { monitor, is_soon: receivers.elements.len() <= FEW };
                 match table.extend(tracer, (&ids, &sky), &receivers, FIRST_RAYS.min(rays), &begin) {
-                    Err(_) if is_over(monitor) => return Ok(()),
+                    Err(ExtendError::Stopped(_)) if is_over(monitor) => return Ok(()),
                     done => done?,
                 }
             }
             while table.columns() < rays && !is_over(monitor) {
                 let next = (2 * table.columns()).min(rays);
                 match table.extend(tracer, (&ids, &sky), &receivers, next, &Hurry(monitor)) {
-                    Err(_) if is_over(monitor) => break,
+                    Err(ExtendError::Stopped(_)) if is_over(monitor) => break,
                     done => done?,
                 }
             }
             Ok(())
-        })
+        })?;
+        if self.table.bytes_in_files() > in_files {
+            let (bytes, folder) = (size(self.table.bytes_in_files()), std::env::temp_dir());
+            monitor.note(&format!(
+                "{bytes} of rays, which memory does not hold, lie in a temporary file in {}",
+                folder.display()
+            ));
+        }
+        Ok(())
     }
 
     /// How far what is displayed may be from what the solution of the same rows would be displayed as (catalogue 42); at the
@@ -385,7 +397,7 @@ impl<'a> Solution<'a> {
         for (value, [r, g, b]) in self.values.iter_mut().zip(single(&x)) {
             *value = [r, g, b, 0.0];
         }
-        let gathered = self.gathered_halves();
+        let gathered = self.gathered_halves()?;
         let mean = |[a, b]: [[f32; 4]; 2], band: usize| 0.5 * (a[band] + b[band]);
         for i in 0..n {
             for band in 0..3 {
@@ -398,11 +410,11 @@ impl<'a> Solution<'a> {
     }
 
     /// F X among the elements, as two halves whose difference tells the noise of rays; a matrix has none.
-    fn gathered_halves(&self) -> Vec<[[f32; 4]; 2]> {
+    fn gathered_halves(&self) -> Result<Vec<[[f32; 4]; 2]>, Error> {
         let values = self.of_elements();
         match &self.matrix {
-            None => self.table.halves(&values),
-            Some(matrix) => matrix.gather(&values[..self.elements.len()]).into_iter().map(|h| [h, h]).collect(),
+            None => Ok(self.table.halves(&values)?),
+            Some(matrix) => Ok(matrix.gather(&values[..self.elements.len()])?.into_iter().map(|h| [h, h]).collect()),
         }
     }
 
@@ -435,14 +447,14 @@ impl<'a> Solution<'a> {
     }
 
     /// The same as the two halves of its rays tell it.
-    pub(crate) fn indirect_halves(&self) -> Vec<[Bands; 2]> {
+    pub(crate) fn indirect_halves(&self) -> Result<Vec<[Bands; 2]>, Error> {
         if self.is_ambient() {
-            return self.indirect.iter().map(|h| [*h; 2]).collect();
+            return Ok(self.indirect.iter().map(|h| [*h; 2]).collect());
         }
         let both = |(daylight, of_elements): (&[Bands; 2], [[f32; 4]; 2])| {
             std::array::from_fn(|k| std::array::from_fn(|band| (daylight[k][band] + of_elements[k][band]).max(0.0)))
         };
-        self.table.daylight().iter().zip(self.gathered_halves()).map(both).collect()
+        Ok(self.table.daylight().iter().zip(self.gathered_halves()?).map(both).collect())
     }
 
     /// Transmittance of each element, nothing where no light passes: of what arrives on its other side, the share that
@@ -483,21 +495,26 @@ impl<'a> Solution<'a> {
 
     /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it; with a
     /// matrix, of its rows from what the table says that elements take up.
-    pub fn raw_closure(&self) -> f64 {
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn raw_closure(&self) -> Result<f64, Error> {
         if let Some(matrix) = &self.matrix {
             let mut of_elements = vec![[1f32; 4]; self.values.len()];
             of_elements[self.elements.len()..].fill([0.0; 4]);
             let (found, seen) =
-                (matrix.gather(&of_elements[..self.elements.len()]), self.table.rows_mean(&of_elements));
-            return found.iter().zip(&seen).fold(0f64, |worst, (a, b)| worst.max(f64::from((a[0] - b[0]).abs())));
+                (matrix.gather(&of_elements[..self.elements.len()])?, self.table.rows_mean(&of_elements)?);
+            return Ok(found.iter().zip(&seen).fold(0f64, |worst, (a, b)| worst.max(f64::from((a[0] - b[0]).abs()))));
         }
         let ones = vec![[1f32; 4]; self.values.len()];
-        self.table.rows_mean(&ones).iter().fold(0f64, |worst, sum| worst.max((f64::from(sum[0]) - 1.0).abs()))
+        let sums = self.table.rows_mean(&ones)?;
+        Ok(sums.iter().fold(0f64, |worst, sum| worst.max((f64::from(sum[0]) - 1.0).abs())))
     }
 }
 
 /// What an answer would need that the options do not allow.
 fn memory_error(tracer: &Tracer, elements: usize, needed: usize, options: &SolveOptions) -> Error {
     let least = least_memory(tracer.scene);
-    Error::Memory { elements, rays: options.rays, needed, allowed: options.memory, least }
+    let rays = (options.stored(elements) > 0).then_some(options.rays);
+    Error::Memory { elements, rays, needed, allowed: options.memory, least }
 }

@@ -38,7 +38,9 @@ pub struct SolveOptions {
     pub params: Params,
     /// Stops when what is displayed is near enough, whatever the residual.
     pub displayed: Option<Displayed>,
-    /// Memory that the scene, its mesh and tree, the solution and what is written of it may take, bytes.
+    /// Memory that the scene, its mesh and tree, the solution and what is written of it may take, bytes. Rays that it does not hold
+    /// lie in a temporary file, in the system's folder for such, and are read from there at each sweep: that takes longer, and the
+    /// numbers are the same.
     pub memory: usize,
 }
 
@@ -61,7 +63,11 @@ impl Default for SolveOptions {
 }
 
 /// Rays per cell below which what elements show is of no use; what looks them up can do with fewer.
-pub(crate) const LEAST_RAYS: usize = 32;
+const LEAST_RAYS: usize = 32;
+
+/// Most bytes of a ray whose hit is an entry of a stored matrix: 16 among those of its row, up to as many that are spare there, and
+/// 12 in the matrix.
+const ENTRY: usize = 44;
 
 /// Most cells where form factors or elimination fill a matrix, unless an element size is asked for: four million pairs.
 const MATRIX_CELLS: usize = 2000;
@@ -109,7 +115,13 @@ impl SolveOptions {
         if needed > allowed { Err(Error::Elimination { solver, elements, needed, allowed }) } else { Ok(()) }
     }
 
-    /// Fewer rays where the memory does not hold those that are asked for: an error that is missed tells more than none.
+    /// Bytes of the matrix that the table of so many cells is copied to, for solvers that need rows; none where it is only applied.
+    pub(super) fn stored(&self, cells: usize) -> usize {
+        let is_stored = self.form_factors.is_none() && !self.solver.applies_only();
+        if is_stored { cells.saturating_mul(self.rays).saturating_mul(ENTRY) } else { 0 }
+    }
+
+    /// Fewer rays where they become a matrix that the memory does not hold: an error that is missed tells more than none.
     pub(crate) fn fit(&mut self, tracer: &Tracer) {
         while self.rays > LEAST_RAYS && Solution::memory(tracer, self) > self.memory {
             self.rays /= 2;

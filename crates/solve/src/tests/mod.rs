@@ -73,7 +73,7 @@ fn catalogue_9_neumann_terms_bound_the_iterates() {
     let mut b = e.to_vec();
     let mut h = vec![0.0; 6];
     for bounces in 1..=4 {
-        transport.apply(&b, &mut h, 1);
+        transport.apply(&b, &mut h, 1).unwrap();
         for i in 0..6 {
             b[i] = e[i] + rho * h[i];
         }

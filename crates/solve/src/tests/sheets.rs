@@ -78,7 +78,7 @@ fn catalogue_12_shares_sum_to_one() {
     let e = [1.0, 1.0, 0., 0., 0., 0., 0., 0.];
     lu(&transport, &response, &e, &mut b, &tight(), |_, _| Go::On).unwrap();
     let mut h = vec![0.0; 8];
-    transport.apply(&b, &mut h, 2);
+    transport.apply(&b, &mut h, 2).unwrap();
     for (band, (rho, tau)) in OPTICS.into_iter().enumerate() {
         let absorbed: f64 = (0..4)
             .map(|i| {
@@ -128,8 +128,8 @@ impl Transport for Parted {
         self.0.space()
     }
 
-    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) {
-        self.0.apply(b, h, bands);
+    fn apply(&self, b: &[f64], h: &mut [f64], bands: usize) -> Result<(), SolveError> {
+        self.0.apply(b, h, bands)
     }
 
     fn parts(&self) -> Option<&[u32]> {

@@ -63,7 +63,7 @@ fn catalogue_47_patches_and_elements() {
         assert!((area[p] * (b[p] - by_elements[p])).abs() <= 1e-12, "patch {p}");
     }
     let (mut mean_h, own_h) = (vec![0.0; patches], scene.mean(&h, 1));
-    between.apply(&b, &mut mean_h, 1);
+    between.apply(&b, &mut mean_h, 1).unwrap();
     for p in 0..patches {
         assert!((area[p] * (mean_h[p] - own_h[p])).abs() <= 1e-12);
     }

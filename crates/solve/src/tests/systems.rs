@@ -30,7 +30,7 @@ impl System {
     /// ‖E + R F B − B‖/‖E‖ weighted by area, written out anew.
     pub fn residual(&self, b: &[f64]) -> f64 {
         let mut h = vec![0.0; b.len()];
-        self.transport.apply(b, &mut h, 1);
+        self.transport.apply(b, &mut h, 1).unwrap();
         let area = &self.transport.space().area;
         let (mut own, mut all) = (0.0, 0.0);
         for i in 0..b.len() {

@@ -76,7 +76,7 @@ fn solved(transport: &SparseTransport, e: &[f64], rho: &[f64]) -> Vec<f64> {
     let (mut b, mut h) = (vec![0.0; e.len()], vec![0.0; e.len()]);
     let params = Params { tolerance: 1e-12, ..Params::default() };
     solve(Solver::Gmres, transport, &response, e, &mut b, &params, |_, _| Go::On).unwrap();
-    transport.apply(&b, &mut h, 1);
+    transport.apply(&b, &mut h, 1).unwrap();
     h
 }
 
@@ -233,7 +233,7 @@ fn catalogue_89_two_plates_and_a_blocker() {
     // B = 2 + x of the upper plate, linear.
     let b: Vec<f64> = mesh.positions().iter().map(|p| if p.z > 0.5 { 2.0 + p.x } else { 0.0 }).collect();
     let mut h = vec![0.0; b.len()];
-    transport.apply(&b, &mut h, 1);
+    transport.apply(&b, &mut h, 1).unwrap();
     for (i, p) in mesh.positions().iter().enumerate().filter(|(_, p)| p.z == 0.0) {
         let clamp = |c: DVec3| c.clamp(DVec3::new(-1., -1., 1.), DVec3::ONE);
         let facing_down = |corners: Vec<DVec3>| corners.into_iter().rev().collect::<Vec<_>>();
