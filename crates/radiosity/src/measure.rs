@@ -6,7 +6,7 @@
 //! budget ends, and the report says which.
 
 use crate::monitor::{Monitor, Stages, has_time, is_over};
-use crate::points::{Points, Rays};
+use crate::points::{Light, Rays};
 use crate::{Error, Solution, SolveOptions, stations};
 use glam::DVec3;
 use radiosity_scene::{Bands, luminance};
@@ -84,7 +84,7 @@ const MOST_FIRST: usize = 4096;
 const FEWEST: Rays = [32, 32];
 
 /// Noise within this of what it is to be is not worth another step.
-const ENOUGH: f64 = 1.1;
+pub(crate) const ENOUGH: f64 = 1.1;
 
 /// One round of refinement.
 #[derive(Clone, Debug, Serialize)]
@@ -201,7 +201,7 @@ pub fn measure(
     let closer = (options.audit_points / watched.len().max(1)).clamp(1, CLOSER) as u32;
     let most_paths = most_paths(options.error).saturating_mul(closer);
     let (mut rounds, mut solved) = (Vec::new(), 0);
-    let mut light = Points::new(&solution, &places, first, monitor)?;
+    let mut light = Light::new(&solution, &places[..], first, monitor)?;
     let mut noise_asked = NOISE * options.error;
     let mut best: Option<Measurement> = None;
     loop {

@@ -1,15 +1,16 @@
-//! Light at points: a few rays for each, then more for those whose first ones disagree ([`crate::allocation`]). All that were sent
-//! count, until another solution takes the place of the one that they looked up.
+//! Light of points and of elements: a few rays for each, then more for those whose first ones disagree ([`crate::allocation`]). All
+//! that were sent count, until another solution takes the place of the one that they looked up.
 
 use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth, mean};
 use crate::{Error, Monitor, Solution};
+use glam::DVec3;
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
 use radiosity_transport::Shadowing;
 use radiosity_view::{FLAT, Finding, Planes, Pooled};
 use std::time::Instant;
 
-/// Gather rays and shadow rays of a point to begin with.
+/// Gather rays and shadow rays of a receiver to begin with.
 pub(crate) type Rays = [usize; 2];
 
 /// Root mean square noise over all points, lx, in what is gathered and in direct light.
@@ -27,14 +28,106 @@ const DARK: f64 = 0.1;
 /// Two halves of a point say little of its noise: as much as those of points with about as much light, this many on either side.
 const ALIKE: usize = 32;
 
-/// Light at places, and what it was found with.
-pub(crate) struct Points<'p> {
-    places: &'p [Place],
-    /// On which side of a triangle each lies, where it shares with others of a plane.
-    on: Vec<Option<Side>>,
+/// Whose light is asked for.
+pub(crate) trait Asked {
+    /// Whether direct light is shared on planes as what is gathered is. It pays where receivers lie close to each other.
+    const SHARES_DIRECT: bool;
+
+    /// Noise of any of them relative to its own light at most, over the noise that is asked, relative to the mean.
+    const MOST_NOISE: f64;
+
+    /// How many.
+    fn len(&self) -> usize;
+
+    /// By how much one of them counts.
+    fn weight(&self, i: usize) -> f64;
+
+    /// Where one of them lies on a side of a triangle, if it shares with others of that plane.
+    fn on(&self, solution: &Solution, i: usize) -> Option<(DVec3, usize, Side)>;
+
+    /// Planes on which they share.
+    fn planes(&self, solution: &Solution) -> Planes;
+
+    /// Direct light of some of them. With so many rays each, and the salt that chooses them, here and below.
+    fn direct(
+        &self,
+        solution: &Solution,
+        own: &[usize],
+        rays: (usize, u32),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Bands>, Error>;
+
+    /// What some of them gather, as two halves of the rays tell it.
+    fn gathered(
+        &self,
+        solution: &Solution,
+        own: &[usize],
+        rays: (usize, u32),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<[Bands; 2]>, Error>;
+}
+
+/// Points.
+impl Asked for &[Place] {
+    const SHARES_DIRECT: bool = false;
+    const MOST_NOISE: f64 = VISIBLE;
+
+    fn len(&self) -> usize {
+        <[Place]>::len(self)
+    }
+
+    fn weight(&self, _i: usize) -> f64 {
+        1.0
+    }
+
+    fn on(&self, solution: &Solution, i: usize) -> Option<(DVec3, usize, Side)> {
+        let place = &self[i];
+        Some((place.point, place.triangle as usize, side_of(solution, place)?))
+    }
+
+    fn planes(&self, solution: &Solution) -> Planes {
+        Planes::new(solution.tracer().mesh, &solution.elements)
+    }
+
+    fn direct(
+        &self,
+        solution: &Solution,
+        own: &[usize],
+        (rays, salt): (usize, u32),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Bands>, Error> {
+        solution.direct_by(&of(self, own), &shadowing(rays), salt, monitor)
+    }
+
+    fn gathered(
+        &self,
+        solution: &Solution,
+        own: &[usize],
+        (rays, salt): (usize, u32),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<[Bands; 2]>, Error> {
+        solution.halves_at(&of(self, own), rays, salt, monitor)
+    }
+}
+
+fn of(places: &[Place], own: &[usize]) -> Vec<Place> {
+    own.iter().map(|i| places[*i]).collect()
+}
+
+/// Of the noise that there was more than this is left where more rays bring nothing: rays are doubled or not, and where most receivers need
+/// a little more, those of a few would be doubled again and again.
+const WORTH: f64 = 0.97;
+
+/// Light of receivers, and what it was found with.
+pub(crate) struct Light<A> {
+    asked: A,
+    /// Where each lies on a plane, if it shares there with others.
+    on: Vec<Option<(DVec3, usize, Side)>>,
     planes: Option<Planes>,
     direct: Found,
     gathered: Found,
+    /// Both, shared.
+    lit: Vec<Pooled>,
     pooled: Vec<Pooled>,
     /// Numbers of sets of rays that were sent.
     sets: u32,
@@ -42,35 +135,30 @@ pub(crate) struct Points<'p> {
     pub seconds: f64,
 }
 
-impl<'p> Points<'p> {
+impl<A: Asked> Light<A> {
     /// With the first rays.
-    pub fn new(
-        solution: &Solution,
-        places: &'p [Place],
-        rays: Rays,
-        monitor: &dyn Monitor,
-    ) -> Result<Points<'p>, Error> {
-        let on: Vec<Option<Side>> = places.iter().map(|place| side_of(solution, place)).collect();
+    pub fn new(solution: &Solution, asked: A, rays: Rays, monitor: &dyn Monitor) -> Result<Light<A>, Error> {
+        let on: Vec<_> = (0..asked.len()).map(|i| asked.on(solution, i)).collect();
         // Nothing is shared in the open: planes of a million triangles would take 360 MB and four seconds.
-        let shares = on.iter().any(Option::is_some);
-        let planes = shares.then(|| Planes::new(solution.tracer().mesh, &solution.elements));
-        let (direct, gathered, pooled) = Default::default();
-        let mut points = Points { places, on, planes, direct, gathered, pooled, sets: 0, seconds: 0.0 };
-        points.begin(solution, rays, monitor)?;
-        Ok(points)
+        let planes = on.iter().any(Option::is_some).then(|| asked.planes(solution));
+        let (direct, gathered, lit, pooled) = Default::default();
+        let mut light = Light { asked, on, planes, direct, gathered, lit, pooled, sets: 0, seconds: 0.0 };
+        light.begin(solution, rays, monitor)?;
+        Ok(light)
     }
 
     /// Begins anew with another solution: what it leaves to direct light may be something else.
     pub fn begin(&mut self, solution: &Solution, [gather, shadow]: Rays, monitor: &dyn Monitor) -> Result<(), Error> {
         let began = Instant::now();
+        let all: Vec<usize> = (0..self.asked.len()).collect();
         let mut half = || {
             self.sets += 1;
-            solution.direct_by(self.places, &shadowing(shadow / 2), self.sets, monitor)
+            self.asked.direct(solution, &all, (shadow / 2, self.sets), monitor)
         };
         let halves = half()?.into_iter().zip(half()?).map(|(a, b)| [a, b]);
         self.direct = Found::of_halves(halves, shadow as u32, evened);
         self.sets += 1;
-        let halves = solution.halves_at(self.places, gather, self.sets, monitor)?;
+        let halves = self.asked.gathered(solution, &all, (gather, self.sets), monitor)?;
         self.gathered = Found::of_halves(halves, gather as u32, evened);
         self.share();
         self.seconds = began.elapsed().as_secs_f64();
@@ -78,7 +166,7 @@ impl<'p> Points<'p> {
     }
 
     /// Sends more rays, so that no more `noise` is left in all, lx; up to `most` times as many as there are, if that is said. Whether
-    /// any were sent.
+    /// that brought anything.
     pub fn grow(
         &mut self,
         solution: &Solution,
@@ -86,67 +174,73 @@ impl<'p> Points<'p> {
         most: Option<f64>,
         monitor: &dyn Monitor,
     ) -> Result<bool, Error> {
-        let began = Instant::now();
+        let (began, before) = (Instant::now(), self.noise());
         let [of_gathered, of_direct] = split(self.noise_by_kind(), self.rays(), noise);
         self.sets += 1;
-        let (places, set) = (self.places, self.sets);
-        let of = |own: &[usize]| -> Vec<Place> { own.iter().map(|i| places[*i]).collect() };
-        let alike = vec![1.0; places.len()];
+        let (asked, set) = (&self.asked, self.sets);
+        let weights: Vec<f64> = (0..asked.len()).map(|i| asked.weight(i)).collect();
         let light: Vec<f64> = self.irradiance().iter().map(|e| f64::from(luminance(*e))).collect();
-        let average = light.iter().sum::<f64>() / places.len().max(1) as f64;
-        let ceilings: Vec<f64> = light.iter().map(|e| VISIBLE * noise * (e / average).max(DARK)).collect();
+        let average = self.mean(|i| light[i]);
+        let ceilings: Vec<f64> = light.iter().map(|e| A::MOST_NOISE * noise * (e / average).max(DARK)).collect();
         let [for_gathered, for_direct] = POWERS;
-        let mut times = growth(&self.direct.noise, &alike, &ceilings, of_direct, for_direct);
+        let spread = |pooled: &[Pooled]| -> Vec<f32> { pooled.iter().map(|p| p.spread).collect() };
+        let mut times = growth(&spread(&self.lit), &weights, &ceilings, of_direct, for_direct);
         curb(&mut times, most);
-        let more_direct = self.direct.grow((&times, for_direct), |own, rays| {
-            solution.direct_by(&of(own), &shadowing(rays as usize), set, monitor)
-        })?;
-        let spread: Vec<f32> = self.pooled.iter().map(|p| p.spread).collect();
-        let mut times = growth(&spread, &alike, &ceilings, of_gathered, for_gathered);
+        let more_direct = self
+            .direct
+            .grow((&times, for_direct), |own, rays| asked.direct(solution, own, (rays as usize, set), monitor))?;
+        let mut times = growth(&spread(&self.pooled), &weights, &ceilings, of_gathered, for_gathered);
         curb(&mut times, most);
         let more_gathered = self.gathered.grow((&times, for_gathered), |own, rays| {
-            let halves = solution.halves_at(&of(own), rays as usize, set, monitor)?;
-            Ok(halves.into_iter().map(mean).collect())
+            Ok(asked.gathered(solution, own, (rays as usize, set), monitor)?.into_iter().map(mean).collect())
         })?;
         self.share();
         self.seconds += began.elapsed().as_secs_f64();
-        Ok(more_direct || more_gathered)
+        Ok((more_direct || more_gathered) && self.noise() < WORTH * before)
     }
 
-    /// Has points of a plane share what they gathered, as far as it is smooth.
+    /// Has receivers on a plane share what they found, as far as it is smooth.
     fn share(&mut self) {
-        let light = &self.gathered.light;
+        self.lit = if A::SHARES_DIRECT { self.shared(&self.direct) } else { alone(&self.direct) };
+        self.pooled = self.shared(&self.gathered);
+    }
+
+    fn shared(&self, found: &Found) -> Vec<Pooled> {
+        let mut pooled = alone(found);
+        let Some(planes) = &self.planes else { return pooled };
         let finding = |i: usize| {
-            let (Place { point, triangle, .. }, side) = (self.places[i], self.on[i]?);
-            let noise = self.gathered.noise[i];
-            // Noisier points have more rays, so that all weigh about the same.
-            Some(Finding { point, triangle: triangle as usize, side, light: light[i], noise, weight: 1.0 })
+            let (point, triangle, side) = self.on[i]?;
+            // Noisier ones have more rays, so that all weigh about the same.
+            Some((i, Finding { point, triangle, side, light: found.light[i], noise: found.noise[i], weight: 1.0 }))
         };
-        let alone = |i: usize| Pooled::alone(light[i], self.gathered.noise[i]);
-        let mut pooled: Vec<Pooled> = (0..self.places.len()).map(alone).collect();
-        if let Some(planes) = &self.planes {
-            let own: Vec<usize> = (0..self.places.len()).filter(|&i| self.on[i].is_some()).collect();
-            let found: Vec<Finding> = own.iter().filter_map(|&i| finding(i)).collect();
-            own.into_iter().zip(planes.pooled(&found)).for_each(|(i, shared)| pooled[i] = shared);
-        }
-        self.pooled = pooled;
+        let (own, findings): (Vec<usize>, Vec<Finding>) = (0..self.on.len()).filter_map(finding).unzip();
+        own.into_iter().zip(planes.pooled(&findings)).for_each(|(i, shared)| pooled[i] = shared);
+        pooled
     }
 
     /// Irradiance, lx per band.
     pub fn irradiance(&self) -> Vec<Bands> {
         // What paths find beyond what they look up may be less than nothing.
-        let all = |(d, p): (&Bands, &Pooled)| std::array::from_fn(|k| (d[k] + p.light[k]).max(0.0));
-        self.direct.light.iter().zip(&self.pooled).map(all).collect()
+        let all = |(d, p): (&Pooled, &Pooled)| std::array::from_fn(|k| (d.light[k] + p.light[k]).max(0.0));
+        self.lit.iter().zip(&self.pooled).map(all).collect()
+    }
+
+    /// Mean over all by their weights.
+    fn mean(&self, of: impl Fn(usize) -> f64) -> f64 {
+        let weights = || (0..self.asked.len()).map(|i| (i, self.asked.weight(i)));
+        let total: f64 = weights().map(|(_, weight)| weight).sum();
+        weights().map(|(i, weight)| weight * of(i)).sum::<f64>() / total.max(f64::MIN_POSITIVE)
+    }
+
+    /// Root mean square illuminance, lx.
+    pub fn size(&self) -> f64 {
+        let light = self.irradiance();
+        self.mean(|i| f64::from(luminance(light[i])).powi(2)).sqrt()
     }
 
     /// The noise that is left.
     fn noise_by_kind(&self) -> Noise {
-        let root = |squares: f64| (squares / self.places.len().max(1) as f64).sqrt();
-        let square = |noise: f32| f64::from(noise).powi(2);
-        [
-            root(self.pooled.iter().map(|p| square(p.spread)).sum()),
-            root(self.direct.noise.iter().map(|noise| square(*noise)).sum()),
-        ]
+        [&self.pooled, &self.lit].map(|pooled| self.mean(|i| f64::from(pooled[i].spread).powi(2)).sqrt())
     }
 
     /// The same in all, lx.
@@ -155,13 +249,18 @@ impl<'p> Points<'p> {
         gathered.hypot(direct)
     }
 
-    /// Gather rays and shadow rays of a point, on average.
+    /// Gather rays and shadow rays of a receiver, on average.
     pub fn rays(&self) -> Rays {
         [&self.gathered, &self.direct].map(|found| {
             let all: usize = found.rays.iter().map(|rays| *rays as usize).sum();
             all.div_ceil(found.rays.len().max(1))
         })
     }
+}
+
+/// What each found by itself.
+fn alone(found: &Found) -> Vec<Pooled> {
+    found.light.iter().zip(&found.noise).map(|(light, noise)| Pooled::alone(*light, *noise)).collect()
 }
 
 /// Seconds of a shadow ray over those of a gather ray with what follows it, about: in the Cornell box and in a furnished office.
@@ -201,7 +300,7 @@ fn side_of(solution: &Solution, place: &Place) -> Option<Side> {
     (cosine.abs() > FLAT).then_some(if cosine > 0.0 { Side::Front } else { Side::Back })
 }
 
-/// Standard errors of points whose halves are `apart` from their mean, lx: each one's own and those of points that are about as
+/// Standard errors of receivers whose halves are `apart` from their mean, lx: each one's own and those of others that are about as
 /// bright count the same.
 fn evened(light: &[Bands], apart: &[f32]) -> Vec<f32> {
     let mut order: Vec<usize> = (0..light.len()).collect();
@@ -258,14 +357,14 @@ mod tests {
         let solve = crate::SolveOptions { looked_up: true, cells: 500, rays: 16, ..Default::default() };
         let solution = Solution::new(&tracer, &solve, &()).unwrap();
         let places: Vec<Place> = crate::stations::spread(&solution, 400, 5).iter().map(|s| s.place).collect();
-        let truth = Points::new(&solution, &places, [8192, 8192], &()).unwrap().irradiance();
-        let off = |points: &Points| {
+        let truth = Light::new(&solution, &places[..], [8192, 8192], &()).unwrap().irradiance();
+        let off = |points: &Light<&[Place]>| {
             let pairs = points.irradiance().into_iter().zip(&truth);
             let off: Vec<f64> = pairs.map(|(e, t)| f64::from(luminance(e) - luminance(*t))).collect();
             let n = off.len() as f64;
             ((off.iter().map(|x| x * x).sum::<f64>() / n).sqrt(), off.iter().sum::<f64>() / n)
         };
-        let mut points = Points::new(&solution, &places, [64, 64], &()).unwrap();
+        let mut points = Light::new(&solution, &places[..], [64, 64], &()).unwrap();
         let (before, _) = off(&points);
         assert!(points.noise() > 0.5 * before && points.noise() < 2.0 * before, "{} {before}", points.noise());
         let asked = 0.3 * points.noise();

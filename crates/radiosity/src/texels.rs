@@ -102,14 +102,17 @@ pub(crate) fn light(
     let size = root_mean_square(solution);
     let ceiling =
         |(d, p): (&Bands, &Pooled)| VISIBLE * error * f64::from(luminance(*d) + luminance(p.light)).max(DARK * size);
+    let mut lit = pooled(&direct);
     let ceilings: Vec<f64> = direct.light.iter().zip(&indirect).map(ceiling).collect();
     // What is planned within a deadline are the usual rays, and no more are sent.
     let [most_gathered, most_shadow] = usual_rays(error).map(|rays| pace::left(monitor).map(|_| rays as f64));
-    let mut times = growth(&direct.noise, &area, &ceilings, DIRECT_NOISE * error * size, DIRECT_POWER);
+    let spread: Vec<f32> = lit.iter().map(|p| p.spread).collect();
+    let mut times = growth(&spread, &area, &ceilings, DIRECT_NOISE * error * size, DIRECT_POWER);
     curb(&mut times, most_shadow.map(|most| most / shadow as f64));
     direct.grow((&times, DIRECT_POWER), |own, rays| {
         solution.direct_by(&of(own), &shadowing(rays as usize), 3, monitor)
     })?;
+    lit = pooled(&direct);
     if let Some(gathered) = &mut gathered {
         let spread: Vec<f32> = indirect.iter().map(|p| p.spread).collect();
         let mut times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * size, GATHERED_POWER);
@@ -120,5 +123,5 @@ pub(crate) fn light(
         })?;
         indirect = pooled(gathered);
     }
-    Ok(TexelLight { direct: direct.light, indirect })
+    Ok(TexelLight { direct: lit.into_iter().map(|p| p.light).collect(), indirect })
 }

@@ -81,6 +81,33 @@ impl<'a> Referee<'a> {
         sum.map(|s| (s / f64::from(samples.max(1))) as f32)
     }
 
+    /// Mean irradiance (lux per band) over an area: that of `samples` paths, each from the place that a point of the unit square
+    /// stands for. Of those that bring no light the ones that `counts` refuses are left out. Different `seed`s are independent.
+    pub fn mean_irradiance(
+        &self,
+        place: impl Fn([f32; 2]) -> Place,
+        counts: impl Fn(&Place) -> bool,
+        samples: u32,
+        seed: u64,
+    ) -> Bands {
+        let mut random = Random::new(seed);
+        let [directions, places] = [0, 1].map(|_| Sequence::new(random.next_bits(), random.next_bits()));
+        let (mut sum, mut counted) = ([0f64; 3], 0u32);
+        for i in 0..samples {
+            let [x, y, ..] = places.point(i);
+            let place = place([x, y]);
+            let path = self.path(&place, &frame(place.normal), directions.point(i).map(f64::from), &mut random);
+            if path == [0.0; 3] && !counts(&place) {
+                continue;
+            }
+            counted += 1;
+            for (sum, e) in sum.iter_mut().zip(path) {
+                *sum += e;
+            }
+        }
+        sum.map(|s| (s / f64::from(counted.max(1))) as f32)
+    }
+
     /// One estimate of the irradiance at a place; the four numbers choose its first ray and first light sample.
     fn path(&self, place: &Place, first_frame: &[DVec3; 3], first: [f64; 4], random: &mut Random) -> [f64; 3] {
         let mut place = *place;
