@@ -7,7 +7,7 @@
 //! by the same norm, the area-weighted relative L2 error of its luminance. The path tracer is the referee as audits use it, its
 //! first bounce stratified. At centres the engine is what `render` runs: elements, exposure, direct light, rows, solver,
 //! continuous field, and direct light once more at the centres. It doubles M, the rays per element, and sends M shadow
-//! rays from each centre. For means it is `Solution::light_of`, with half as much noise each time, over a solution of some 4,000 cells and
+//! rays from each centre. For means it is `Solution::light_of`, with half the variance each time, over a solution of some 4,000 cells and
 //! one for each triangle. The mesh and the tree of boxes are made beforehand for both. Nothing is
 //! denoised; elements of a plane share the light of their rays, which is part of the method, and so is its error in the result.
 //!
@@ -210,8 +210,8 @@ fn run(scene: &Scene, name: &str, target: f64, elements: usize, means: bool) -> 
                 let solution = solved(looked_up);
                 let exposure = Exposure::new(&tracer, &mesh, elements, &()).expect("nobody stops it");
                 let light =
-                    solution.light_of(elements, &exposure, 1.0 / f64::from(work), &()).expect("nobody stops it");
-                exam.judged().map(|i| light[asked[i].0]).collect()
+                    solution.light_of(elements, &exposure, f64::from(work).powf(-0.5), &()).expect("nobody stops it");
+                exam.judged().map(|i| light.irradiance[asked[i].0]).collect()
             }
         }
     };
@@ -219,7 +219,7 @@ fn run(scene: &Scene, name: &str, target: f64, elements: usize, means: bool) -> 
     one_thread.install(|| {
         let path_tracer = exam.time_to_target(("path tracer: paths", 64), exam.stride, paths);
         let engine =
-            exam.time_to_target(if means { ("engine: 1 / noise", 16) } else { ("engine: rays", 8) }, 1, engine);
+            exam.time_to_target(if means { ("engine: 1 / noise²", 256) } else { ("engine: rays", 8) }, 1, engine);
         println!("\nat {:.1} %: path tracer {path_tracer:.2} s, engine {engine:.3} s", 100.0 * target);
         println!("ratio {:.1}", path_tracer / engine);
     });

@@ -172,8 +172,8 @@ impl<'b, 'a> Canvas<'b, 'a> {
         look_up(drawn.atlas.pages[page], &drawn.irradiance[page], a + at.x * (b - a) + at.y * (c - a))
     }
 
-    /// Every texel is lit like a point of the surface; those inside solids are left to their neighbours. What is gathered is pooled:
-    /// where that is smooth, points of a texel differ by the edges of shadows alone.
+    /// Every texel is lit like a point of the surface; those inside solids are left to their neighbours. What is gathered is pooled, and
+    /// direct light: where that is smooth, points of a texel differ by the edges of shadows alone.
     fn light(
         &self,
         atlas: &Atlas,

@@ -94,6 +94,7 @@ mod tests {
         // What is held is what was told, within what only some scenes need.
         assert!(held(&tracer) < least && least < 4 * held(&tracer) + scene.triangles.len() * ELEMENT_BYTES, "{least}");
     }
+
     struct Notes(Mutex<Vec<String>>);
 
     impl Monitor for Notes {

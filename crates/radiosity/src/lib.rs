@@ -49,6 +49,7 @@ pub use bake::{BakeOptions, Baked, bake};
 pub use compare::{CompareOptions, Comparison, compare};
 pub use cornell::cornell_box;
 pub use displayed::{Displayed, Shown};
+pub use element_light::ElementLight;
 pub use equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
 pub use error::Error;
 pub use factors::{Doubt, Excess, Factors, FactorsOptions, Missed, factors};

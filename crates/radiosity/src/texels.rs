@@ -1,5 +1,5 @@
 //! Light of texels: a few rays for each, then more for those whose first ones disagree
-//! ([`crate::allocation`]): for what is gathered, by what halves differ by after it was shared ([`Atlas::pooled`]). In a furnished office a
+//! ([`crate::allocation`]), by what halves differ by after light was shared ([`Atlas::pooled`]); direct light of thinned ones is not. In a furnished office a
 //! twentieth of the texels has two thirds of the squared error, if all have as many rays.
 
 use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth, mean};
@@ -8,7 +8,7 @@ use crate::bake::{Baked, gather_rays};
 use crate::judge::{root_mean_square, thinned as thin};
 use crate::measure::rays_for;
 use crate::pace;
-use crate::points::shadowing;
+use crate::points::{shadowing, unless_dark};
 use crate::{Error, Monitor};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
@@ -74,6 +74,11 @@ pub(crate) fn light(
     let of = |own: &[usize]| -> Vec<Place> { own.iter().map(|i| places[*i]).collect() };
     let evened = |_: &[Bands], apart: &[f32]| sheet.atlas.evened(sheet.page, sheet.texels, apart);
     let pooled = |found: &Found| sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.noise, &found.rays);
+    // Noisier ones have more shadow rays, so that all weigh about the same.
+    let alike = vec![1; at.len()];
+    let shared_direct = |found: &Found| {
+        unless_dark(found, sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.noise, &alike))
+    };
 
     let shared = |rays: usize| -> Result<(Option<Found>, Vec<Pooled>), Error> {
         if !gathers {
@@ -102,7 +107,7 @@ pub(crate) fn light(
     let size = root_mean_square(solution);
     let ceiling =
         |(d, p): (&Bands, &Pooled)| VISIBLE * error * f64::from(luminance(*d) + luminance(p.light)).max(DARK * size);
-    let mut lit = pooled(&direct);
+    let mut lit = shared_direct(&direct);
     let ceilings: Vec<f64> = direct.light.iter().zip(&indirect).map(ceiling).collect();
     // What is planned within a deadline are the usual rays, and no more are sent.
     let [most_gathered, most_shadow] = usual_rays(error).map(|rays| pace::left(monitor).map(|_| rays as f64));
@@ -112,7 +117,7 @@ pub(crate) fn light(
     direct.grow((&times, DIRECT_POWER), |own, rays| {
         solution.direct_by(&of(own), &shadowing(rays as usize), 3, monitor)
     })?;
-    lit = pooled(&direct);
+    lit = shared_direct(&direct);
     if let Some(gathered) = &mut gathered {
         let spread: Vec<f32> = indirect.iter().map(|p| p.spread).collect();
         let mut times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * size, GATHERED_POWER);

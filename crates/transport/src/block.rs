@@ -1,6 +1,6 @@
 //! A block of columns of the table of hit ids: rows one behind the other, in memory or in a file.
 //!
-//! The file has no name and ends with the process, however that ends. Its bytes are those that memory would hold, in the order of
+//! The file has no name, or on Windows one that nobody else can open, and ends with the process, however that ends. Its bytes are those that memory would hold, in the order of
 //! rows: each is written where it belongs as soon as it is traced, and sweeps read them in order, some [`BUFFER`] bytes at a time
 //! and thread. It is read and not mapped, as mapped pages count as memory of the process. What the system keeps of it for itself
 //! it gives up when others need the room; so reading costs a copy while there is room, and as much as the disk takes where there

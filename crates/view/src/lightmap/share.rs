@@ -1,4 +1,4 @@
-//! Texels of a chart share what they gathered ([`pooled`]), and what they know of its noise.
+//! Texels of a chart share what they found ([`pooled`]), and what they know of its noise.
 
 use super::{Atlas, Placed, Texel};
 use crate::pool::{Pooled, Sample, pooled};
