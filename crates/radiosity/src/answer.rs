@@ -6,7 +6,7 @@ use glam::DVec2;
 use radiosity_scene::elements::ElementId;
 use radiosity_scene::{Bands, Side};
 use radiosity_trace::Place;
-use radiosity_transport::{PointReceivers, Shadowing};
+use radiosity_transport::{PointReceivers, Receivers, Shadowing};
 use radiosity_view::Field;
 use rayon::prelude::*;
 
@@ -105,8 +105,17 @@ impl Solution<'_> {
         salt: u32,
         monitor: &dyn Monitor,
     ) -> Result<Vec<[Bands; 2]>, Error> {
-        let receivers = PointReceivers { places, shaded: &[], salt };
-        let gather = || self.gather().irradiance(&receivers, rays, &Watch(monitor));
+        self.halves_of(&PointReceivers { places, shaded: &[], salt }, rays, monitor)
+    }
+
+    /// What receivers gather, as two halves of their rays tell it.
+    pub(crate) fn halves_of(
+        &self,
+        receivers: &impl Receivers,
+        rays: usize,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<[Bands; 2]>, Error> {
+        let gather = || self.gather().irradiance(receivers, rays, &Watch(monitor));
         Ok(self.stages.time(monitor, "gather", gather)?)
     }
 
@@ -132,11 +141,20 @@ impl Solution<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
         let shaded: Vec<bool> = places.par_iter().map(|place| self.may_be_shaded(place)).collect();
-        let receivers = PointReceivers { places, shaded: &shaded, salt };
+        self.direct_of(&PointReceivers { places, shaded: &shaded, salt }, shadowing, monitor)
+    }
+
+    /// Direct irradiance of receivers.
+    pub(crate) fn direct_of(
+        &self,
+        receivers: &impl Receivers,
+        shadowing: &Shadowing,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Bands>, Error> {
         let columns = self.stages.time(monitor, "direct light", || {
-            self.luminaires.columns(self.tracer(), &receivers, shadowing, &Watch(monitor))
+            self.luminaires.columns(self.tracer(), receivers, shadowing, &Watch(monitor))
         })?;
-        Ok((0..places.len()).map(|i| columns.mean(i)).collect())
+        Ok((0..receivers.len()).map(|i| columns.mean(i)).collect())
     }
 
     /// Whether any light may be hidden from a place: whether any shadow ray of its cell was stopped. Of places in the open

@@ -1,7 +1,6 @@
 //! Light of elements that are finer than those that were solved for: means over their areas, by a final gather.
 
 use crate::measure::ENOUGH;
-use crate::monitor::Watch;
 use crate::points::{Asked, Light, Rays};
 use crate::{Error, Monitor, Solution};
 use glam::DVec3;
@@ -86,12 +85,8 @@ impl Asked for Open<'_> {
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
-        let receivers = Part { open: self, own, salt };
         let shadowing = Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 };
-        let columns = solution.stages.time(monitor, "direct light", || {
-            solution.luminaires.columns(solution.tracer(), &receivers, &shadowing, &Watch(monitor))
-        })?;
-        Ok((0..own.len()).map(|i| columns.mean(i)).collect())
+        solution.direct_of(&Part { open: self, own, salt }, &shadowing, monitor)
     }
 
     fn gathered(
@@ -101,9 +96,7 @@ impl Asked for Open<'_> {
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
     ) -> Result<Vec<[Bands; 2]>, Error> {
-        let receivers = Part { open: self, own, salt };
-        let gather = || solution.gather().irradiance(&receivers, rays, &Watch(monitor));
-        Ok(solution.stages.time(monitor, "gather", gather)?)
+        solution.halves_of(&Part { open: self, own, salt }, rays, monitor)
     }
 }
 

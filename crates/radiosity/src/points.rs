@@ -26,7 +26,7 @@ const VISIBLE: f64 = 5.0;
 const DARK: f64 = 0.1;
 
 /// Of the noise that there was more than this is left where more rays bring nothing: rays are doubled or not, and where most receivers need
-/// a little more, those of a few would be doubled again and again (in the Cornell box for 13 steps and 20 s, which took 2 % of the noise).
+/// a little more, those of a few would be doubled again and again (in the Cornell box for eleven steps and 20 s more, which took 2 % of the noise).
 const WORTH: f64 = 0.97;
 
 /// Two halves of a point say little of its noise: as much as those of points with about as much light, this many on either side.
