@@ -254,6 +254,18 @@ impl<'a> Tracer<'a> {
         }
     }
 
+    /// Whether what a ray met after a distance lies flat on the back of an opaque one-sided surface, in front of which it would have been seen
+    /// from the other side: so does a solid on another one that it touches, for those inside that.
+    pub fn is_on_back(&self, ray: &Ray, distance: f32) -> bool {
+        let reach = (REACH * self.offset) as f32;
+        let begin = (distance - reach).max(0.0);
+        let around = Ray { origin: ray.origin + begin * ray.direction, t_max: distance + reach - begin, ..*ray };
+        self.tree.blocked_where(&around, |t, _, _, back| {
+            let Kind { double_sided, see_through } = self.kind[t as usize];
+            back && !double_sided && !see_through
+        })
+    }
+
     /// Whether two places see each other. The far end is moved off its surface like the near one, so that neither
     /// blocks the ray between them.
     #[inline]

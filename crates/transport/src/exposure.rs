@@ -1,7 +1,9 @@
 //! What of each element is exposed, and what is buried: under a box that stands on the floor, inside a wall that
 //! another wall runs into.
 //!
-//! A place is buried when (nearly) all it sees is backs of one-sided surfaces. Radiosity of an element is meant as the
+//! A place is buried when (nearly) all it sees is backs of one-sided surfaces. Where the solid around it touches another one, it sees the front
+//! of that, which lies flat on the back of its own; so do rooms whose walls have one surface for either side, so that this says
+//! nothing, and what else is seen decides. Radiosity of an element is meant as the
 //! mean over its exposed part, since only that part is ever seen; averaging in the buried part would darken the seams
 //! along every contact (the "shadow leaks" of lightmap bakers). A pilot finds elements with places that are buried; those are
 //! examined on a grid, more finely along the border of what is buried, which keeps most samples out of the buried part;
@@ -9,10 +11,11 @@
 
 use radiosity_scene::{Elements, Mesh};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
-use radiosity_trace::{Found, Place, Tracer};
+use radiosity_trace::{Found, Place, Ray, Tracer};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use crate::gather::near;
 use crate::receivers::Site;
 use crate::{Progress, Stopped};
 
@@ -31,6 +34,12 @@ const WIDE: u32 = FINE / COARSE;
 /// Rays that examine one place.
 const PROBE: u32 = 8;
 
+/// Where some of these meet fronts on backs, which say nothing, so many are sent at most, until two have met backs alone; and so many, if none
+/// has: in a book in the middle of a pile one in ten does.
+const MOST_PROBE: u32 = 32;
+const LEAST_BACKS: u32 = 2;
+const WITHOUT_BACK: u32 = 16;
+
 /// A place is buried when at least this many of its probe rays meet backs. One of eight may slip through a gap
 /// between solids that touch.
 const BURIED: u32 = 7;
@@ -39,18 +48,50 @@ const BURIED: u32 = 7;
 /// two or three rays. To believe the first one that meets no back makes surfaces in a furnished office 0.1 % darker, as
 /// rays slip through where solids touch.
 pub fn is_buried(tracer: &Tracer, place: &Place, seed: u32) -> bool {
+    is_inside(tracer, place, (seed, false))
+}
+
+/// The same, where it is `known` of places around that they are inside a solid: fronts on backs count as backs then.
+fn is_inside(tracer: &Tracer, place: &Place, (seed, known): (u32, bool)) -> bool {
     let frame = frame(place.normal);
     let sequence = Sequence::new(seed, 0x0b0b);
-    let mut missed = 0;
-    for i in 0..PROBE {
+    let (mut backs, mut missed) = (0, 0);
+    for i in 0..MOST_PROBE {
         let [u, v, _, _] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-        missed += u32::from(tracer.first(&tracer.ray(place, direction, f64::INFINITY), seed ^ i) != Found::Back);
-        if missed > PROBE - BURIED {
+        match sight(tracer, &tracer.ray(place, direction, f64::INFINITY), (f32::INFINITY, seed ^ i)) {
+            Sight::Back => backs += 1,
+            Sight::Seen => missed += 1,
+            Sight::Both => backs += u32::from(known),
+        }
+        if missed > PROBE - BURIED || i + 1 == WITHOUT_BACK && backs == 0 {
             return false;
         }
+        if i + 1 >= PROBE && backs >= if missed == 0 { LEAST_BACKS } else { BURIED } {
+            return true;
+        }
     }
-    true
+    false
+}
+
+/// What a ray tells of whether it is inside a solid.
+#[derive(Clone, Copy, PartialEq)]
+enum Sight {
+    /// The back of a one-sided surface: it is.
+    Back,
+    /// The front of a surface on such a back.
+    Both,
+    /// Anything else: it is not.
+    Seen,
+}
+
+/// What a ray meets; fronts beyond `reach` are not examined.
+fn sight(tracer: &Tracer, ray: &Ray, (reach, seed): (f32, u32)) -> Sight {
+    match tracer.first(ray, seed) {
+        Found::Back => Sight::Back,
+        Found::Surface { distance, .. } if distance < reach && tracer.is_on_back(ray, distance) => Sight::Both,
+        _ => Sight::Seen,
+    }
 }
 
 /// For each element, the exposed places among 8 × 8; whole elements need no entry.
@@ -129,6 +170,11 @@ impl Exposure {
         self.masks.get(&element) == Some(&0)
     }
 
+    /// Whether a place of an element is buried. Who asks it of many places asks [`Exposure::is_buried`] of their elements before.
+    pub fn hides(&self, tracer: &Tracer, (element, place): (u32, &Place), seed: u32) -> bool {
+        is_inside(tracer, place, (seed, self.is_partial(element)))
+    }
+
     /// The exposed places among the 8 × 8 of an element, one bit each.
     pub fn mask(&self, element: u32) -> u64 {
         self.masks.get(&element).copied().unwrap_or(u64::MAX)
@@ -158,14 +204,14 @@ fn nth_bit(mut mask: u64, n: u32) -> u32 {
     mask.trailing_zeros()
 }
 
-/// Which of a few rays from all over a site meet backs, one bit each.
+/// Which of a few rays from all over a site meet backs, one bit each, or what lies on a back nearby.
 fn backs(tracer: &Tracer, site: &Site, sequence: &Sequence) -> u32 {
-    let frame = frame(site.normal);
+    let (frame, reach) = (frame(site.normal), near(site.area()) as f32);
     (0..PILOT).fold(0, |backs, i| {
         let [u, v, x, y] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-        let found = tracer.first(&tracer.ray(&site.place(x, y), direction, f64::INFINITY), i);
-        backs | u32::from(found == Found::Back) << i
+        let ray = tracer.ray(&site.place(x, y), direction, f64::INFINITY);
+        backs | u32::from(sight(tracer, &ray, (reach, i)) != Sight::Seen) << i
     })
 }
 
@@ -178,19 +224,31 @@ fn is_suspect(tracer: &Tracer, site: &Site, (sequence, element): (&Sequence, u32
     })
 }
 
+/// Whether all of a site is buried: whether rays from all over it see nothing but backs, and some of them nothing on these.
+fn is_covered(tracer: &Tracer, site: &Site, sequence: &Sequence) -> bool {
+    let frame = frame(site.normal);
+    let mut backs = 0;
+    let is_dark = |i: u32| {
+        let [u, v, x, y] = sequence.point(i);
+        let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
+        let sight = sight(tracer, &tracer.ray(&site.place(x, y), direction, f64::INFINITY), (f32::INFINITY, i));
+        backs += u32::from(sight == Sight::Back);
+        sight != Sight::Seen
+    };
+    (0..MOST_PROBE).all(is_dark) && backs >= LEAST_BACKS
+}
+
 /// The mask of a suspect element.
 fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, is_fine: bool, backs: u32) -> u64 {
     // The first places are those of the coarse grid, the next ones those of the fine one.
     let is_open = |(column, row): (u32, u32), grid: u32, number: u32| {
         let [dx, dy, _, _] = sequence.point(PILOT + number);
         let place = site.place((column as f32 + dx) / grid as f32, (row as f32 + dy) / grid as f32);
-        !is_buried(tracer, &place, element ^ number << 24)
+        !is_inside(tracer, &place, (element ^ number << 24, true))
     };
     let fine = |column: u32, row: u32| is_open((column, row), FINE, COARSE * COARSE + FINE * row + column);
 
-    // What is buried as far as its corners, and wherever the pilot was, is so all over.
-    let ends = [0, FINE - 1];
-    if backs == (1 << PILOT) - 1 && ends.iter().all(|row| ends.iter().all(|column| !fine(*column, *row))) {
+    if backs == (1 << PILOT) - 1 && is_covered(tracer, site, sequence) {
         return 0;
     }
 
@@ -299,6 +357,103 @@ mod tests {
         for (boxes, share, tolerance) in cases {
             let found = exposed(boxes);
             assert!((found - share).abs() <= tolerance, "{boxes:?}: {found} for {share}");
+        }
+    }
+
+    /// A closed box from one corner to another; turned inside out, a room.
+    fn add_box(scene: &mut Scene, name: &str, [low, high]: [[f64; 3]; 2], is_room: bool) {
+        let at = |corner: usize| DVec3::from_array(std::array::from_fn(|k| [low, high][corner >> k & 1][k]));
+        for mut face in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+            if is_room {
+                face.reverse();
+            }
+            scene.add_quad(name, 0, face.map(at));
+        }
+    }
+
+    /// By object, the exposed share of its area that faces along each axis, down and up: where `glanced`, for elements that are looked up.
+    fn shares(scene: &Scene, glanced: bool) -> impl Fn(&str, DVec3) -> f64 {
+        let mesh = Mesh::new(scene);
+        let tracer = Tracer::new(scene, &mesh);
+        let elements = Elements::new(scene, &mesh, 0.3);
+        let exposure = match glanced {
+            true => Exposure::glanced(&tracer, &mesh, &elements, &()).unwrap(),
+            false => Exposure::new(&tracer, &mesh, &elements, &()).unwrap(),
+        };
+        let of = |e: u32| {
+            let object = scene.triangle_object[mesh.source[elements.place(e).0] as usize] as usize;
+            let area = elements.area(&mesh, e);
+            (scene.objects[object].name.clone(), elements.normal(&mesh, e), area, area * exposure.share(e))
+        };
+        let all: Vec<_> = (0..elements.len() as u32).map(of).collect();
+        move |name: &str, along: DVec3| {
+            let own = all.iter().filter(|(of, normal, ..)| of == name && normal.dot(along) > 0.9);
+            let [whole, open] = own.fold([0.0; 2], |sum, (.., whole, open)| [sum[0] + whole, sum[1] + open]);
+            open / whole
+        }
+    }
+
+    /// Solids that touch each other show the places inside them each other's fronts, which say nothing.
+    #[test]
+    fn what_lies_inside_a_pile_or_a_row_is_buried() {
+        let mut scene = Scene::default();
+        scene.materials.push(Material::default());
+        add_box(&mut scene, "floor", [[-1.5, -1.5, -0.2], [1.5, 1.5, 0.0]], false);
+        for k in 0..4 {
+            let (low, high) = (0.04 * f64::from(k), 0.04 * f64::from(k + 1));
+            add_box(&mut scene, &format!("lying {k}"), [[-0.5, -0.5, low], [-0.2, -0.2, high]], false);
+            add_box(&mut scene, &format!("standing {k}"), [[low, 0.0, 0.0], [high, 0.2, 0.28]], false);
+        }
+        for glanced in [false, true] {
+            let share = shares(&scene, glanced);
+            let open = |is_open: bool| f64::from(u8::from(is_open));
+            for k in 0..4 {
+                let (lying, standing) = (format!("lying {k}"), format!("standing {k}"));
+                let faces = [
+                    (&lying, DVec3::Z, k == 3),
+                    (&lying, -DVec3::Z, false),
+                    (&lying, DVec3::X, true),
+                    (&standing, DVec3::X, k == 3),
+                    (&standing, -DVec3::X, k == 0),
+                    (&standing, DVec3::Z, true),
+                    (&standing, -DVec3::Z, false),
+                    (&standing, DVec3::Y, true),
+                ];
+                for (name, along, is_open) in faces {
+                    assert_eq!(share(name, along), open(is_open), "{name} {along} {glanced}");
+                }
+            }
+            let floor = share("floor", DVec3::Z);
+            assert!((floor - (1.0 - (0.09 + 0.032) / 9.0)).abs() < 0.004, "{floor}, {glanced}");
+            assert_eq!([share("floor", -DVec3::Z), share("floor", DVec3::X)], [1.0; 2]);
+        }
+    }
+
+    /// Walls with a surface for either side are no solids, whatever else stands there.
+    #[test]
+    fn rooms_back_to_back_are_not_buried() {
+        let mut scene = Scene::default();
+        scene.materials.push(Material::default());
+        for k in 0..3 {
+            let x = 3.0 * f64::from(k);
+            let name = format!("room {k}");
+            add_box(&mut scene, &name, [[x, 0.0, 0.0], [x + 3.0, 3.0, 3.0]], true);
+            add_box(&mut scene, "hull", [[x, 0.0, 0.0], [x + 3.0, 3.0, 3.0]], false);
+            if k == 1 {
+                add_box(&mut scene, "crate", [[x + 1.0, 1.0, 0.0], [x + 2.0, 2.0, 1.0]], false);
+            }
+        }
+        for glanced in [false, true] {
+            let share = shares(&scene, glanced);
+            for k in 0..3 {
+                let name = format!("room {k}");
+                for along in [DVec3::X, DVec3::Y, -DVec3::Z] {
+                    assert_eq!([share(&name, along), share(&name, -DVec3::Z)], [1.0; 2], "{name} {along} {glanced}");
+                }
+            }
+            let floor = share("room 1", DVec3::Z);
+            assert!((floor - 8.0 / 9.0).abs() < 0.03, "{floor}");
+            assert_eq!(share("crate", DVec3::Z), 1.0);
         }
     }
 }

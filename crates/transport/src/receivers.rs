@@ -55,6 +55,11 @@ impl Site {
         self.triangle
     }
 
+    /// Its area, m².
+    pub(crate) fn area(&self) -> f64 {
+        0.5 * self.edges[0].cross(self.edges[1]).length()
+    }
+
     /// Its only place, where it has no area.
     pub fn point(&self) -> Option<Place> {
         let Site { origin, normal, triangle, .. } = *self;
