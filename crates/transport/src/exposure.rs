@@ -40,6 +40,9 @@ const MOST_PROBE: u32 = 32;
 const LEAST_BACKS: u32 = 2;
 const WITHOUT_BACK: u32 = 16;
 
+/// So many do where places around are known to be inside a solid, if none of them gets away.
+const KNOWN: u32 = 4;
+
 /// A place is buried when at least this many of its probe rays meet backs. One of eight may slip through a gap
 /// between solids that touch.
 const BURIED: u32 = 7;
@@ -67,7 +70,8 @@ fn is_inside(tracer: &Tracer, place: &Place, (seed, known): (u32, bool)) -> bool
         if missed > PROBE - BURIED || i + 1 == WITHOUT_BACK && backs == 0 {
             return false;
         }
-        if i + 1 >= PROBE && backs >= if missed == 0 { LEAST_BACKS } else { BURIED } {
+        let is_sure = if known { backs >= KNOWN } else { i + 1 >= PROBE && backs >= LEAST_BACKS };
+        if missed == 0 && is_sure || backs >= BURIED {
             return true;
         }
     }
