@@ -48,12 +48,11 @@ pub fn station(tracer: &Tracer, triangle: usize, uv: DVec2, side: Side) -> Stati
     Station { place, uv, side }
 }
 
-/// A point as a user gave it: on the surface that passes within a tenth of a per mille of the scene's size (at most
-/// one millimetre) and faces the same way, if there is one; free in space otherwise. Rounded coordinates would start
-/// rays behind the surface that is meant.
+/// A point as a user gave it: on the surface that passes within [`Tracer::reach`] and faces the same way, if there is one;
+/// free in space otherwise. Rounded coordinates would start rays behind the surface that is meant.
 pub fn snap(tracer: &Tracer, point: DVec3, normal: DVec3) -> Place {
     let free = Place { point, normal, triangle: u32::MAX };
-    let reach = (tracer.mesh.tolerance * 100.0).min(1e-3);
+    let reach = tracer.reach();
     let ray = tracer.free_ray(point + reach * normal, -normal);
     match tracer.first(&ray, 0) {
         Found::Surface { triangle, side, distance, .. } if f64::from(distance) <= 2.0 * reach => {

@@ -15,6 +15,9 @@ use rayon::prelude::*;
 /// (backs are set back by two offsets).
 const REACH: f64 = 4.0;
 
+/// Cosine below which depths below a surface are not told from distances along it.
+const LEAST_COSINE: f32 = 0.05;
+
 /// Hits with weights above this are not looked at more closely. Triangles less high than a ten-thousandth of the scene
 /// may be at an edge all over.
 const EDGE: f32 = 0.02;
@@ -254,16 +257,21 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Whether what a ray met after a distance lies flat on the back of an opaque one-sided surface, in front of which it would have been seen
-    /// from the other side: so does a solid on another one that it touches, for those inside that.
-    pub fn is_on_back(&self, ray: &Ray, distance: f32) -> bool {
-        let reach = (REACH * self.offset) as f32;
-        let begin = (distance - reach).max(0.0);
-        let around = Ray { origin: ray.origin + begin * ray.direction, t_max: distance + reach - begin, ..*ray };
+    /// Whether the `triangle` that a ray met after a distance lies flat on the back of an opaque one-sided surface, or sinks into it by less
+    /// than the [`Tracer::reach`]: so does a solid on one that it touches, for those inside of that.
+    pub fn is_on_back(&self, ray: &Ray, triangle: u32, distance: f32) -> bool {
+        let sinks = self.reach() as f32 / self.normals[triangle as usize].dot(ray.direction).abs().max(LEAST_COSINE);
+        let begin = (distance - (REACH * self.offset) as f32).max(0.0);
+        let around = Ray { origin: ray.origin + begin * ray.direction, t_max: distance + sinks - begin, ..*ray };
         self.tree.blocked_where(&around, |t, _, _, back| {
             let Kind { double_sided, see_through } = self.kind[t as usize];
             back && !double_sided && !see_through
         })
+    }
+
+    /// What people mean to touch lies no further apart than this, metres: a tenth of a per mille of the scene's size, at most one millimetre.
+    pub fn reach(&self) -> f64 {
+        (self.mesh.tolerance * 100.0).min(1e-3)
     }
 
     /// Whether two places see each other. The far end is moved off its surface like the near one, so that neither

@@ -93,7 +93,9 @@ enum Sight {
 fn sight(tracer: &Tracer, ray: &Ray, (reach, seed): (f32, u32)) -> Sight {
     match tracer.first(ray, seed) {
         Found::Back => Sight::Back,
-        Found::Surface { distance, .. } if distance < reach && tracer.is_on_back(ray, distance) => Sight::Both,
+        Found::Surface { triangle, distance, .. } if distance < reach && tracer.is_on_back(ray, triangle, distance) => {
+            Sight::Both
+        }
         _ => Sight::Seen,
     }
 }
@@ -400,17 +402,21 @@ mod tests {
     /// Solids that touch each other show the places inside them each other's fronts, which say nothing.
     #[test]
     fn what_lies_inside_a_pile_or_a_row_is_buried() {
+        // They touch, or sink into each other a little.
+        [0.0, 2e-4].into_iter().for_each(are_piles_buried);
+    }
+
+    fn are_piles_buried(sunk: f64) {
         let mut scene = Scene::default();
         scene.materials.push(Material::default());
         add_box(&mut scene, "floor", [[-1.5, -1.5, -0.2], [1.5, 1.5, 0.0]], false);
         for k in 0..4 {
-            let (low, high) = (0.04 * f64::from(k), 0.04 * f64::from(k + 1));
+            let (low, high) = (0.04 * f64::from(k) - sunk, 0.04 * f64::from(k + 1));
             add_box(&mut scene, &format!("lying {k}"), [[-0.5, -0.5, low], [-0.2, -0.2, high]], false);
             add_box(&mut scene, &format!("standing {k}"), [[low, 0.0, 0.0], [high, 0.2, 0.28]], false);
         }
         for glanced in [false, true] {
             let share = shares(&scene, glanced);
-            let open = |is_open: bool| f64::from(u8::from(is_open));
             for k in 0..4 {
                 let (lying, standing) = (format!("lying {k}"), format!("standing {k}"));
                 let faces = [
@@ -424,7 +430,8 @@ mod tests {
                     (&standing, DVec3::Y, true),
                 ];
                 for (name, along, is_open) in faces {
-                    assert_eq!(share(name, along), open(is_open), "{name} {along} {glanced}");
+                    let found = share(name, along);
+                    assert!((found - f64::from(u8::from(is_open))).abs() < 0.01, "{name} {along} {glanced}: {found}");
                 }
             }
             let floor = share("floor", DVec3::Z);
