@@ -78,5 +78,5 @@ pub(crate) fn is_hidden(solution: &Solution, station: &Station) -> bool {
     let Some(element) = solution.elements.at(station.place.triangle, u, v, station.side) else { return true };
     solution.exposure.is_buried(element)
         || (solution.exposure.is_partial(element)
-            && solution.exposure.hides(solution.tracer(), (element, &station.place), element))
+            && radiosity_transport::exposure::is_buried(solution.tracer(), &station.place, element))
 }

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use radiosity_scene::Side;
 use radiosity_trace::sampling::{Sequence, hash, unit};
 use radiosity_trace::{Found, Place, Tracer};
-use radiosity_transport::exposure::open_place;
+use radiosity_transport::exposure::{is_buried, open_place};
 use radiosity_view::picture::shading_normal;
 
 /// `count` stations spread evenly over the exposed area, one in each of as many equal shares of it, less those that turn
@@ -33,8 +33,7 @@ pub fn spread(solution: &Solution, count: usize, seed: u32) -> Vec<Station> {
         let uv = solution.elements.sample(element as u32, x, y);
         let station = station(solution.tracer(), triangle, uv, side);
         // Nobody sees the light inside a solid, and nothing is written there.
-        let on = (element as u32, &station.place);
-        if !solution.exposure.hides(solution.tracer(), on, hash(seed ^ i as u32)) {
+        if !is_buried(solution.tracer(), &station.place, hash(seed ^ i as u32)) {
             stations.push(station);
         }
     }

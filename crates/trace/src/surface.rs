@@ -15,6 +15,9 @@ use rayon::prelude::*;
 /// (backs are set back by two offsets).
 const REACH: f64 = 4.0;
 
+/// Cosine above which surfaces lie flat on each other.
+const FLAT: f32 = 0.999;
+
 /// Cosine below which depths below a surface are not told from distances along it.
 const LEAST_COSINE: f32 = 0.05;
 
@@ -257,16 +260,19 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Whether the `triangle` that a ray met after a distance lies flat on the back of an opaque one-sided surface, or sinks into it by less
-    /// than the [`Tracer::reach`]: so does a solid on one that it touches, for those inside of that.
-    pub fn is_on_back(&self, ray: &Ray, triangle: u32, distance: f32) -> bool {
-        let sinks = self.reach() as f32 / self.normals[triangle as usize].dot(ray.direction).abs().max(LEAST_COSINE);
-        let begin = (distance - (REACH * self.offset) as f32).max(0.0);
+    /// The rest of a ray beyond a contact: where the `triangle` that it met after a distance lies flat on the back of an opaque one-sided
+    /// surface, or sinks into it by less than the [`Tracer::reach`], as a solid does that touches the one around the ray. Nothing elsewhere.
+    pub fn beyond_contact(&self, ray: &Ray, triangle: u32, distance: f32) -> Option<Ray> {
+        let (flat, margin) = (self.normals[triangle as usize], (REACH * self.offset) as f32);
+        let sinks = self.reach() as f32 / flat.dot(ray.direction).abs().max(LEAST_COSINE);
+        let begin = (distance - margin).max(0.0);
         let around = Ray { origin: ray.origin + begin * ray.direction, t_max: distance + sinks - begin, ..*ray };
-        self.tree.blocked_where(&around, |t, _, _, back| {
+        let back = self.tree.closest_where(&around, |t, _, _, back| {
             let Kind { double_sided, see_through } = self.kind[t as usize];
-            back && !double_sided && !see_through
-        })
+            back && !double_sided && !see_through && self.normals[t as usize].dot(flat) < -FLAT
+        })?;
+        let gone = back.t.max(distance - begin) + margin;
+        Some(Ray { origin: around.origin + gone * ray.direction, t_max: ray.t_max - begin - gone, ..*ray })
     }
 
     /// What people mean to touch lies no further apart than this, metres: a tenth of a per mille of the scene's size, at most one millimetre.
