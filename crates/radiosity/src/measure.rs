@@ -167,6 +167,7 @@ pub fn measure(
     let stages = Stages::default();
     let places: Vec<Place> = points.iter().map(|(p, n)| stations::snap(tracer, *p, *n)).collect();
     let mut solve = options.solve;
+    solve.shown = false;
     // The elements are only looked up, and the noise of many averages out: few rays each.
     solve.rays = solve.rays.max(rays_for(options.error, 16.0, 8, 1024));
     let [most, at_one_percent] = LOOKED_UP_CELLS;

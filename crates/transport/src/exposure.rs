@@ -45,34 +45,47 @@ const BACKS: u32 = 3;
 /// Contacts that a ray goes through: of that many books in a row. With four, a twentieth of an office's area counts as seen that is not.
 const CONTACTS: usize = 16;
 
-/// Where other places of an element are buried, so many rays do, if none of them meets anything else: the rest of [`PROBE`] would take as long again.
-const FEWEST: u32 = 4;
+/// How closely elements are examined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Care {
+    /// As is enough for elements that are only looked up: what a coarse mask leaves is rejected place by place, and nothing is asked
+    /// of contacts, which takes ten times as long in a furnished office.
+    Glance,
+    /// The same, but through contacts, where points of the elements are shown.
+    Contacts,
+    /// All there is.
+    Full,
+}
+
+impl Care {
+    /// Up to which distance fronts are examined for what they lie on, where they are at all.
+    fn reach(self, reach: f32) -> f32 {
+        if self == Care::Glance { 0.0 } else { reach }
+    }
+}
 
 /// Whether a place is buried in a solid. To be asked where there is reason to think so; exposed places answer after
 /// two or three rays. To believe the first one that meets no back makes surfaces in a furnished office 0.1 % darker, as
 /// rays slip through where solids touch.
 pub fn is_buried(tracer: &Tracer, place: &Place, seed: u32) -> bool {
-    is_buried_by(PROBE, tracer, place, seed)
+    is_buried_by(Care::Full, tracer, place, seed)
 }
 
-/// The same by fewer rays, at least, where none of them meets anything but backs and contacts.
-fn is_buried_by(fewest: u32, tracer: &Tracer, place: &Place, seed: u32) -> bool {
+/// The same with more or less care.
+fn is_buried_by(care: Care, tracer: &Tracer, place: &Place, seed: u32) -> bool {
     let frame = frame(place.normal);
     let sequence = Sequence::new(seed, 0x0b0b);
     let (mut backs, mut missed) = (0, 0);
     for i in 0..PROBE {
         let [u, v, _, _] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-        match sight(tracer, tracer.ray(place, direction, f64::INFINITY), (f32::INFINITY, seed ^ i)) {
+        match sight(tracer, tracer.ray(place, direction, f64::INFINITY), (care.reach(f32::INFINITY), seed ^ i)) {
             Sight::Back => backs += 1,
             Sight::Silent => {}
             Sight::Seen => missed += 1,
         }
         if missed > SLIPS || backs + PROBE - 1 - i < BACKS {
             return false;
-        }
-        if i + 1 >= fewest && missed == 0 && backs >= BACKS {
-            return true;
         }
     }
     true
@@ -126,26 +139,17 @@ impl Exposure {
         elements: &Elements,
         progress: &impl Progress,
     ) -> Result<Exposure, Stopped> {
-        Exposure::examined(tracer, (mesh, elements), true, progress)
+        Exposure::with_care(Care::Full, tracer, (mesh, elements), progress)
     }
 
-    /// The same without the finer places, for elements that are only looked up: what the mask leaves is rejected place by place.
+    /// The same with more or less care.
     ///
     /// # Errors
     /// [`Stopped`] if `progress` says so.
-    pub fn glanced(
-        tracer: &Tracer,
-        mesh: &Mesh,
-        elements: &Elements,
-        progress: &impl Progress,
-    ) -> Result<Exposure, Stopped> {
-        Exposure::examined(tracer, (mesh, elements), false, progress)
-    }
-
-    fn examined(
+    pub fn with_care(
+        care: Care,
         tracer: &Tracer,
         (mesh, elements): (&Mesh, &Elements),
-        is_fine: bool,
         progress: &impl Progress,
     ) -> Result<Exposure, Stopped> {
         const CHUNK: usize = 1024;
@@ -156,7 +160,7 @@ impl Exposure {
             .map(|chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(n);
                 let masks: Vec<_> =
-                    range.clone().flat_map(|cell| examine_cell(tracer, (mesh, elements), is_fine, cell)).collect();
+                    range.clone().flat_map(|cell| examine_cell(tracer, (mesh, elements), care, cell)).collect();
                 let so_far = done.fetch_add(range.len(), std::sync::atomic::Ordering::Relaxed) + range.len();
                 progress.step(so_far, n).then_some(masks).ok_or(Stopped)
             })
@@ -211,8 +215,8 @@ fn nth_bit(mut mask: u64, n: u32) -> u32 {
 }
 
 /// Which of a few rays from all over a site meet backs, one bit each, or fronts on backs nearby.
-fn backs(tracer: &Tracer, site: &Site, sequence: &Sequence) -> u32 {
-    let (frame, within) = (frame(site.normal), near(site.area()) as f32);
+fn backs(tracer: &Tracer, site: &Site, (sequence, care): (&Sequence, Care)) -> u32 {
+    let (frame, within) = (frame(site.normal), care.reach(near(site.area()) as f32));
     (0..PILOT).fold(0, |backs, i| {
         let [u, v, x, y] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
@@ -223,20 +227,20 @@ fn backs(tracer: &Tracer, site: &Site, sequence: &Sequence) -> u32 {
 
 /// Whether a site may be buried in part: whether any of the places is buried from which rays met backs, or contacts nearby. Others see
 /// backs from afar only, and are not examined for that.
-fn is_suspect(tracer: &Tracer, site: &Site, (sequence, element): (&Sequence, u32), backs: u32) -> bool {
+fn is_suspect(tracer: &Tracer, site: &Site, (sequence, care): (&Sequence, Care), element: u32, backs: u32) -> bool {
     (0..PILOT).filter(|i| backs >> i & 1 == 1).any(|i| {
         let [_, _, x, y] = sequence.point(i);
-        is_buried(tracer, &site.place(x, y), hash(element ^ i << 24))
+        is_buried_by(care, tracer, &site.place(x, y), hash(element ^ i << 24))
     })
 }
 
 /// The mask of a suspect element.
-fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, is_fine: bool, backs: u32) -> u64 {
+fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, care: Care, backs: u32) -> u64 {
     // The first places are those of the coarse grid, the next ones those of the fine one.
     let is_open = |(column, row): (u32, u32), grid: u32, number: u32| {
         let [dx, dy, _, _] = sequence.point(PILOT + number);
         let place = site.place((column as f32 + dx) / grid as f32, (row as f32 + dy) / grid as f32);
-        !is_buried_by(FEWEST, tracer, &place, element ^ number << 24)
+        !is_buried_by(care, tracer, &place, element ^ number << 24)
     };
     let fine = |column: u32, row: u32| is_open((column, row), FINE, COARSE * COARSE + FINE * row + column);
 
@@ -267,7 +271,7 @@ fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, is_f
     (0..FINE * FINE).fold(0, |mask, number| {
         let (column, row) = (number % FINE, number / FINE);
         let block = (column / WIDE, row / WIDE);
-        let is_open = match is_fine && is_at_border(block.0, block.1) {
+        let is_open = match care == Care::Full && is_at_border(block.0, block.1) {
             true => fine(column, row),
             false => is_coarse_open(block.0, block.1),
         };
@@ -279,26 +283,26 @@ fn examine(tracer: &Tracer, site: &Site, sequence: &Sequence, element: u32, is_f
 const LEAST_SHARE: f64 = 0.125;
 
 /// The masks of the elements of a cell that are not wholly exposed.
-fn examine_cell(tracer: &Tracer, (mesh, elements): (&Mesh, &Elements), is_fine: bool, cell: usize) -> Vec<(u32, u64)> {
+fn examine_cell(tracer: &Tracer, (mesh, elements): (&Mesh, &Elements), care: Care, cell: usize) -> Vec<(u32, u64)> {
     let ids = elements.of_cell(cell);
     if elements.share(mesh, ids.start) * (ids.len() as f64) < LEAST_SHARE {
         return Vec::new();
     }
     let whole = Site::new(mesh, elements, ids.start, elements.cell_corners(cell), u64::MAX);
     let sequence = Sequence::new(ids.start, EXPOSURE);
-    let met = backs(tracer, &whole, &sequence);
-    if !is_suspect(tracer, &whole, (&sequence, ids.start), met) {
+    let met = backs(tracer, &whole, (&sequence, care));
+    if !is_suspect(tracer, &whole, (&sequence, care), ids.start, met) {
         return Vec::new();
     }
     let divided = ids.len() > 1;
     ids.filter_map(|element| {
         let site = Site::new(mesh, elements, element, elements.corners(element), u64::MAX);
         let sequence = Sequence::new(element, EXPOSURE);
-        let met = if divided { backs(tracer, &site, &sequence) } else { met };
-        if divided && !is_suspect(tracer, &site, (&sequence, element), met) {
+        let met = if divided { backs(tracer, &site, (&sequence, care)) } else { met };
+        if divided && !is_suspect(tracer, &site, (&sequence, care), element, met) {
             return None;
         }
-        let mask = examine(tracer, &site, &sequence, element, is_fine, met);
+        let mask = examine(tracer, &site, &sequence, element, care, met);
         (mask != u64::MAX).then_some((element, mask))
     })
     .collect()
@@ -365,15 +369,12 @@ mod tests {
         }
     }
 
-    /// By object, the exposed share of its area that faces along each axis, down and up: where `glanced`, for elements that are looked up.
-    fn shares(scene: &Scene, glanced: bool) -> impl Fn(&str, DVec3) -> f64 {
+    /// By object, the exposed share of its area that faces along each axis, down and up: with so much care.
+    fn shares(scene: &Scene, care: Care) -> impl Fn(&str, DVec3) -> f64 {
         let mesh = Mesh::new(scene);
         let tracer = Tracer::new(scene, &mesh);
         let elements = Elements::new(scene, &mesh, 0.3);
-        let exposure = match glanced {
-            true => Exposure::glanced(&tracer, &mesh, &elements, &()).unwrap(),
-            false => Exposure::new(&tracer, &mesh, &elements, &()).unwrap(),
-        };
+        let exposure = Exposure::with_care(care, &tracer, (&mesh, &elements), &()).unwrap();
         let of = |e: u32| {
             let object = scene.triangle_object[mesh.source[elements.place(e).0] as usize] as usize;
             let area = elements.area(&mesh, e);
@@ -403,8 +404,8 @@ mod tests {
             add_box(&mut scene, &format!("lying {k}"), [[-0.5, -0.5, low], [-0.2, -0.2, high]], false);
             add_box(&mut scene, &format!("standing {k}"), [[low, 0.0, 0.0], [high, 0.2, 0.28]], false);
         }
-        for glanced in [false, true] {
-            let share = shares(&scene, glanced);
+        for care in [Care::Full, Care::Contacts] {
+            let share = shares(&scene, care);
             for k in 0..4 {
                 let (lying, standing) = (format!("lying {k}"), format!("standing {k}"));
                 let faces = [
@@ -419,11 +420,11 @@ mod tests {
                 ];
                 for (name, along, is_open) in faces {
                     let found = share(name, along);
-                    assert!((found - f64::from(u8::from(is_open))).abs() < 0.01, "{name} {along} {glanced}: {found}");
+                    assert!((found - f64::from(u8::from(is_open))).abs() < 0.01, "{name} {along} {care:?}: {found}");
                 }
             }
             let floor = share("floor", DVec3::Z);
-            assert!((floor - (1.0 - (0.09 + 0.032) / 9.0)).abs() < 0.004, "{floor}, {glanced}");
+            assert!((floor - (1.0 - (0.09 + 0.032) / 9.0)).abs() < 0.004, "{floor}, {care:?}");
             assert_eq!([share("floor", -DVec3::Z), share("floor", DVec3::X)], [1.0; 2]);
         }
     }
@@ -444,8 +445,8 @@ mod tests {
         add_box(&mut scene, "foot", [[7.0, 1.0, -1e-4], [7.1, 1.1, 0.03]], false);
         add_box(&mut scene, "screen", [[6.5, 1.0, 0.5], [6.5005, 2.0, 1.5]], false);
         scene.add_quad("panel", 0, [[8.9, 1., 1.], [8.9, 2., 1.], [8.9, 2., 2.], [8.9, 1., 2.]].map(DVec3::from));
-        for glanced in [false, true] {
-            let share = shares(&scene, glanced);
+        for care in [Care::Full, Care::Contacts] {
+            let share = shares(&scene, care);
             let [x, y, z] = DVec3::AXES;
             for (name, along, expected) in [
                 ("room 0", z, 8.0 / 9.0),
@@ -465,7 +466,7 @@ mod tests {
                 ("panel", x, 1.0),
             ] {
                 let found = share(name, along);
-                assert!((found - expected).abs() < 0.03, "{name} {along} {glanced}: {found} for {expected}");
+                assert!((found - expected).abs() < 0.03, "{name} {along} {care:?}: {found} for {expected}");
             }
             assert_eq!([share("room 2", x), share("room 2", y), share("room 2", -x)], [1.0; 3]);
             assert!(share("room 2", z) > 0.99);

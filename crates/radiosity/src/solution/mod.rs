@@ -119,11 +119,7 @@ impl<'a> Solution<'a> {
         let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
         let begin = begin(elements.len());
         let exposure = stages.time(monitor, "exposure", || {
-            let found = match options.looked_up {
-                true => Exposure::glanced(tracer, mesh, &elements, &begin),
-                false => Exposure::new(tracer, mesh, &elements, &begin),
-            };
-            match found {
+            match Exposure::with_care(options.care(), tracer, (mesh, &elements), &begin) {
                 // Buried places are rejected one by one then.
                 Err(_) if is_over(monitor) => Ok(Exposure::default()),
                 done => done,

@@ -7,6 +7,7 @@ use crate::equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
 use radiosity_scene::Scene;
 use radiosity_solve::{Params, Solver};
 use radiosity_trace::Tracer;
+use radiosity_transport::exposure::Care;
 use radiosity_transport::{FormFactorMethod, Shadowing};
 
 /// How to solve.
@@ -17,6 +18,9 @@ pub struct SolveOptions {
     /// Whether what comes of it is only looked up, by a gather: triangles much smaller than cells get their share of the
     /// rays then, as the noise of many averages out.
     pub looked_up: bool,
+    /// Whether points of the elements are shown, as texels are. Then what lies inside of solids that touch each other is told from what is
+    /// seen, which takes longer; who asks for points of their own does without.
+    pub shown: bool,
     /// How many cells to aim for on top of one per triangle. At ten thousand the walls of a room are cut into cells of
     /// some 15 cm, and their light varies by a few percent from cell to cell.
     pub cells: usize,
@@ -49,6 +53,7 @@ impl Default for SolveOptions {
         SolveOptions {
             element_size: None,
             looked_up: false,
+            shown: true,
             cells: 10_000,
             variation: 0.05,
             rays: 64,
@@ -80,6 +85,15 @@ impl SolveOptions {
             options.params.tolerance = RANDOM_TOLERANCE;
         }
         options
+    }
+
+    /// How closely it is looked for what of the elements is buried.
+    pub(super) fn care(&self) -> Care {
+        match (self.looked_up, self.shown) {
+            (false, _) => Care::Full,
+            (true, true) => Care::Contacts,
+            (true, false) => Care::Glance,
+        }
     }
 
     /// Fewer cells, and none of them divided, where a matrix grows with the square of the elements.
