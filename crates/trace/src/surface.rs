@@ -365,4 +365,45 @@ mod tests {
             assert!((10_000..90_000).contains(&floor), "{floor}");
         }
     }
+
+    /// From under a lid on which another plate lies: through both where these touch or sink into each other by less than the reach, and
+    /// only where light does not pass.
+    #[test]
+    fn rays_go_on_beyond_contacts() {
+        let up = |z: f64| [[0., 0., z], [4., 0., z], [4., 4., z], [0., 4., z]].map(DVec3::from);
+        let down = |z: f64| {
+            let [a, b, c, d] = up(z);
+            [a, d, c, b]
+        };
+        let two_sided = Material { double_sided: true, ..Material::default() };
+        let reach = 4e-4;
+        for (apart, lid, is_contact) in
+            [(0.0, 0, true), (-0.8 * reach, 0, true), (-1.2 * reach, 0, false), (0.0, 1, false)]
+        {
+            let mut scene = Scene { materials: vec![Material::default(), two_sided.clone()], ..Scene::default() };
+            scene.add_quad("lid", lid, up(1.0));
+            let plate = scene.add_quad("plate", 0, down(1.0 + apart));
+            let top = scene.add_quad("top", 0, up(2.0));
+            let mesh = Mesh::new(&scene);
+            let tracer = Tracer::new(&scene, &mesh);
+            assert!((tracer.reach() / reach - 1.0).abs() < 1e-6, "{}", tracer.reach());
+            for (x, z) in [(0.0, 1.0), (0.6, 0.8), (0.99, 0.141)] {
+                let ray = tracer.free_ray(DVec3::new(0.1, 1.9, 0.7), DVec3::new(x, 0.0, z).normalize());
+                let Found::Surface { triangle, distance, .. } = tracer.first(&ray, 0) else { panic!("{apart} {x}") };
+                if lid == 0 {
+                    assert_eq!(
+                        scene.triangle_object[mesh.source[triangle as usize] as usize] as usize, plate,
+                        "{apart}"
+                    );
+                }
+                let beyond = tracer.beyond_contact(&ray, triangle, distance);
+                assert_eq!(beyond.is_some(), is_contact, "{apart} {lid} {x}");
+                let Some(beyond) = beyond else { continue };
+                let hit = tracer.tree().closest(&beyond);
+                let met = hit
+                    .map(|hit| (scene.triangle_object[mesh.source[hit.triangle as usize] as usize] as usize, hit.back));
+                assert!(met.is_none_or(|met| met == (top, true)) && (met.is_some() || z < 0.2), "{met:?} {x}");
+            }
+        }
+    }
 }

@@ -49,7 +49,7 @@ const CONTACTS: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Care {
     /// As is enough for elements that are only looked up: what a coarse mask leaves is rejected place by place, and nothing is asked
-    /// of contacts, which takes ten times as long in a furnished office.
+    /// of contacts, which takes fifteen times as long in a furnished office.
     Glance,
     /// The same, but through contacts, where points of the elements are shown.
     Contacts,
