@@ -58,9 +58,9 @@ pub enum Care {
 }
 
 impl Care {
-    /// Up to which distance fronts are examined for what they lie on, where they are at all.
-    fn reach(self, reach: f32) -> f32 {
-        if self == Care::Glance { 0.0 } else { reach }
+    /// Up to which distance fronts are examined for what they lie on, if they are at all.
+    fn within(self, distance: f32) -> f32 {
+        if self == Care::Glance { 0.0 } else { distance }
     }
 }
 
@@ -79,7 +79,7 @@ fn is_buried_by(care: Care, tracer: &Tracer, place: &Place, seed: u32) -> bool {
     for i in 0..PROBE {
         let [u, v, _, _] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
-        match sight(tracer, tracer.ray(place, direction, f64::INFINITY), (care.reach(f32::INFINITY), seed ^ i)) {
+        match sight(tracer, tracer.ray(place, direction, f64::INFINITY), (care.within(f32::INFINITY), seed ^ i)) {
             Sight::Back => backs += 1,
             Sight::Silent => {}
             Sight::Seen => missed += 1,
@@ -216,7 +216,7 @@ fn nth_bit(mut mask: u64, n: u32) -> u32 {
 
 /// Which of a few rays from all over a site meet backs, one bit each, or fronts on backs nearby.
 fn backs(tracer: &Tracer, site: &Site, (sequence, care): (&Sequence, Care)) -> u32 {
-    let (frame, within) = (frame(site.normal), care.reach(near(site.area()) as f32));
+    let (frame, within) = (frame(site.normal), care.within(near(site.area()) as f32));
     (0..PILOT).fold(0, |backs, i| {
         let [u, v, x, y] = sequence.point(i);
         let direction = cosine_direction(&frame, f64::from(u), f64::from(v));
@@ -369,7 +369,7 @@ mod tests {
         }
     }
 
-    /// By object, the exposed share of its area that faces along each axis, down and up: with so much care.
+    /// The exposed share of the area of an object that faces along a direction, examined with so much care.
     fn shares(scene: &Scene, care: Care) -> impl Fn(&str, DVec3) -> f64 {
         let mesh = Mesh::new(scene);
         let tracer = Tracer::new(scene, &mesh);
