@@ -30,8 +30,8 @@ const PORTION: usize = 1 << 12;
 
 const PASSES: usize = 7;
 
-/// Rays start and end so far from their surfaces, metres, for tracers that cannot leave out a triangle.
-const CLEARANCE: f32 = 1e-4;
+/// Rays start and end so far from their surfaces, as a part of half the scene's largest extent: as far as those of [`Tracer`](radiosity_trace::Tracer).
+const CLEARANCE: f32 = 1.0 / (1 << 21) as f32;
 
 /// Half the side of the squares that bundles go between, metres.
 const HALF: f32 = 0.025;
@@ -39,18 +39,19 @@ const HALF: f32 = 0.025;
 /// Random points on the triangles, uniform by area.
 struct Points<'a> {
     triangles: &'a [[Vec3; 3]],
+    clearance: f32,
     up_to: Vec<f64>,
     drawn: u32,
 }
 
 impl Points<'_> {
-    fn new(triangles: &[[Vec3; 3]]) -> Points<'_> {
+    fn new(triangles: &[[Vec3; 3]], clearance: f32) -> Points<'_> {
         let mut sum = 0.0;
         let up_to = triangles.iter().map(|[a, b, c]| {
             sum += (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3()).length();
             sum
         });
-        Points { triangles, up_to: up_to.collect(), drawn: 0 }
+        Points { triangles, clearance, up_to: up_to.collect(), drawn: 0 }
     }
 
     fn number(&mut self) -> f32 {
@@ -74,7 +75,7 @@ impl Points<'_> {
             (u, v) = (1.0 - u, 1.0 - v);
         }
         let normal = (b - a).cross(c - a).normalize();
-        (a + (b - a) * u + (c - a) * v + normal * CLEARANCE, normal)
+        (a + (b - a) * u + (c - a) * v + normal * self.clearance, normal)
     }
 
     /// Cosine-distributed rays, `each` per point.
@@ -153,7 +154,7 @@ fn measure(name: &str, scene: &Scene, dump: Option<&Path>) {
         write(folder, "triangles", numbers.map(f32::to_bits));
     }
 
-    let mut points = Points::new(&triangles);
+    let mut points = Points::new(&triangles, CLEARANCE * 0.5 * (high - low).max_element() as f32);
     for (kind, ends, rays) in [
         ("single", false, points.cosine(1)),
         ("ordered", false, points.cosine(64)),

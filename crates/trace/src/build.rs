@@ -15,6 +15,7 @@
 //! Building takes 1.3 to 1.8 times as long. Room shared by how large the boxes are, or by how much larger than their triangles, gained nothing.
 
 use crate::collapse::{Costs, choose};
+use crate::intersect::SLACK;
 use crate::spatial::Plane;
 use crate::tree::WIDTH;
 use glam::{Vec3, Vec4};
@@ -72,6 +73,12 @@ impl Item {
         Item { lo: a.min(b).min(c).extend(f32::from_bits(triangle)), hi: a.max(b).max(c).extend(0.0) }
     }
 
+    /// The same with the slack of its triangle.
+    pub fn slackened(&self) -> Item {
+        let Bounds { lo, hi } = Bounds { lo: self.lo, hi: self.hi }.slackened((self.hi - self.lo).truncate());
+        Item { lo: lo.with_w(self.lo.w), hi }
+    }
+
     /// Where there is room for one.
     const NONE: Item = Item { lo: Vec4::from_array([0.0, 0.0, 0.0, f32::from_bits(u32::MAX)]), hi: Vec4::ZERO };
 
@@ -103,7 +110,17 @@ pub(crate) struct Bounds {
 impl Bounds {
     pub const EMPTY: Bounds = Bounds { lo: Vec4::splat(f32::INFINITY), hi: Vec4::splat(f32::NEG_INFINITY) };
 
-    fn of(items: &[Item]) -> Bounds {
+    /// With the slack of a triangle of these extents. Finite, and rounded outwards by at least a unit in the last place, but the same along axes without extent.
+    pub fn slackened(self, extent: Vec3) -> Bounds {
+        let down = |p: Vec4, axis: usize| match extent[axis] {
+            0.0 => p[axis],
+            extent => (p[axis] - SLACK * extent).next_down().clamp(f32::MIN, f32::MAX),
+        };
+        let all_down = |p: Vec4| Vec4::new(down(p, 0), down(p, 1), down(p, 2), 0.0);
+        Bounds { lo: all_down(self.lo), hi: -all_down(-self.hi) }
+    }
+
+    pub fn of(items: &[Item]) -> Bounds {
         items.iter().fold(Bounds::EMPTY, |bounds, item| bounds.join(item.lo, item.hi))
     }
 

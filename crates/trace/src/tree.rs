@@ -6,11 +6,12 @@
 //! alone and not on the walk: the nearer one, at the same distance the one with the lower index; a back is taken to lie
 //! 2^-20 of the largest coordinate further away than it does. So answers are the same on every machine.
 
-use crate::build::{Item, build};
+use crate::build::{Bounds, Item, build};
 use crate::collapse::collapse;
 use crate::intersect::{Prepared, tie_of};
 use crate::{Hit, Ray, portable};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Boxes of a node.
@@ -162,9 +163,11 @@ impl Tree {
         };
         let mut items: Vec<Item> = Vec::with_capacity(len);
         items.extend((0..len).filter_map(item));
+        let Bounds { lo, hi } = Bounds::of(&items);
+        let bounds = (!items.is_empty()).then(|| [lo.truncate(), hi.truncate()]);
+        items.par_iter_mut().for_each(|item| *item = item.slackened());
         let binary = build(&mut items, &corners);
         let (nodes, blocks) = collapse(&binary, &items, &corners);
-        let bounds = binary.first().map(|root| [root.lo, root.hi]);
         let tie = bounds.map_or(0.0, tie_of);
         Tree { nodes, blocks, bounds, tie, len, simd: has_simd() }
     }

@@ -270,6 +270,45 @@ fn coincident_faces_on_the_axes_give_what_every_triangle_gives() {
     }
 }
 
+/// A triangle's box ends where the triangle does: what rounding makes of a ray that meets it there is met in the tree, too, from near and from far, along
+/// the triangle and across it.
+#[test]
+fn edges_of_boxes_give_what_every_triangle_gives() {
+    let mut random = Random(24);
+    let mut met = 0;
+    for i in 0..100_000 {
+        let place = [0.0, 0.0, 1.0, 300.0][i % 4] * random.point();
+        let mut corners = [(); 3].map(|()| place + random.point());
+        // Two thirds are flat along an axis, which the ray is nearly level with every other time.
+        let axis = random.below(3);
+        if i % 3 > 0 {
+            corners.iter_mut().for_each(|corner| corner[axis] = place[axis]);
+        }
+        if i % 7 > 3 {
+            // Near zero a unit in the last place is nothing.
+            corners = corners.map(|corner| corner - corners[0]);
+        }
+        let [a, b, c] = corners;
+        let target = match i % 5 {
+            0 => a,
+            1 | 2 => a + (b - a) * random.next(),
+            _ => a + (b - a) * random.next() + (c - a) * random.next() * 1e-6,
+        };
+        let mut direction = random.direction();
+        if i % 2 == 0 {
+            direction[axis] *= 10f32.powf(-3.0 * random.next());
+        }
+        let origin = target - direction * 10f32.powf(8.0 * random.next() - 4.0);
+        let direction = (target - origin).normalize();
+        if direction.is_finite() {
+            let ray = ray(origin, direction);
+            met += usize::from(closest_brute(&[corners], &ray).is_some());
+            agree(&both(&[corners]), &[corners], &ray);
+        }
+    }
+    assert!(met > 30_000, "only {met} hits");
+}
+
 #[test]
 fn of_two_equal_hits_the_lower_index_counts() {
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
