@@ -54,11 +54,11 @@ fn walk(tree: &Tree, ray: &Prepared, limit: &mut f32, mut found: impl FnMut(Hit,
             let first = stack.len();
             for slot in 0..WIDTH {
                 let (mut near, mut far) = (least, *limit + add);
-                for axis in 0..3 {
+                for (axis, &pad) in pad.iter().enumerate() {
                     let (enter, leave) = (ray.rows[axis], (ray.rows[axis] + 3) % 6);
                     let distance = |row: usize| (node.bounds[row][slot] - ray.origin[axis]) * ray.inverse[axis];
-                    near = near.max(distance(enter) - pad[axis]);
-                    far = far.min(distance(leave) + pad[axis] + add);
+                    near = near.max(distance(enter) - pad);
+                    far = far.min(distance(leave) + pad + add);
                 }
                 if near <= far {
                     stack.push((near, node.child[slot]));
