@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::f64::consts::TAU;
 
 fn case(list: &str, id: &str) -> Value {
-    let data: Value = serde_json::from_str(include_str!("data/radiosity.json")).unwrap();
+    let data: Value = serde_json::from_str(include_str!("../data/radiosity.json")).unwrap();
     data[list].as_array().unwrap().iter().find(|c| c["id"] == id).unwrap().clone()
 }
 

@@ -1,28 +1,15 @@
 //! Live editing: light after any series of edits is that of a fresh start, and that of batch work within noise.
 
-#[path = "common/bits.rs"]
-mod bits;
-#[path = "common/finish.rs"]
-mod finish;
-#[path = "common/full.rs"]
-mod full;
-#[path = "common/furnished.rs"]
-mod furnished;
-#[path = "common/room.rs"]
-mod room;
-#[path = "common/small.rs"]
-mod small;
-
-use bits::bits;
-use finish::finish;
-use full::full;
-use furnished::furnished;
+use crate::bits::bits;
+use crate::finish::finish;
+use crate::full::full;
+use crate::furnished::furnished;
+use crate::small::small;
 use radiosity::session::{
     Applied, Edit, EditError, Form, Layer, LightId, NewLight, NewObject, ObjectId, Session, SessionOptions,
 };
 use radiosity::{Bands, PointLightKind, Scene, cornell_box, luminance};
 use radiosity_trace::sampling::Random;
-use small::small;
 use std::time::Duration;
 
 struct Dice(Random);

@@ -38,7 +38,7 @@ fn pairs(text: &str) -> Vec<(Value, [Facet; 2], f64)> {
 
 #[test]
 fn catalogue_17_polygons_by_the_closed_form() {
-    let pairs = pairs(include_str!("data/view_factors.json"));
+    let pairs = pairs(include_str!("../data/view_factors.json"));
     assert!(pairs.len() >= 17, "{}", pairs.len());
     for (case, [from, to], truth) in pairs {
         let value = exact(&from, &to) / from.area();
@@ -52,7 +52,7 @@ fn catalogue_17_polygons_by_the_closed_form() {
 #[test]
 fn catalogue_17_rows_of_platonic_solids_sum_to_one() {
     let mut count = 0;
-    for case in cases(include_str!("data/view_factors.json")) {
+    for case in cases(include_str!("../data/view_factors.json")) {
         let Some(faces) = case["surfaces"][0]["faces"].as_array() else { continue };
         let faces: Vec<Facet> = faces.iter().map(facet).collect();
         for from in &faces {
@@ -74,7 +74,7 @@ fn catalogue_17_rows_of_platonic_solids_sum_to_one() {
 
 #[test]
 fn catalogue_17_polygons_by_cubature() {
-    for (case, [from, to], truth) in pairs(include_str!("data/view_factors.json")) {
+    for (case, [from, to], truth) in pairs(include_str!("../data/view_factors.json")) {
         let cubature = Cubature { tolerance: 1e-8, ..Cubature::default() };
         let factor = cubature.factor(&from, &to, &Unoccluded);
         assert!((factor.value - truth).abs() <= factor.error && factor.error <= 1e-8, "{}: {factor:?}", case["id"]);
@@ -85,7 +85,7 @@ fn catalogue_17_polygons_by_cubature() {
 #[test]
 fn catalogue_18_polygons_behind_blockers() {
     let mut count = 0;
-    for (case, [from, to], truth) in pairs(include_str!("data/view_factors_occluded.json")) {
+    for (case, [from, to], truth) in pairs(include_str!("../data/view_factors_occluded.json")) {
         let blockers = case["blockers"].as_array().unwrap();
         let blockers: Vec<Facet> = blockers.iter().map(|b| facet(&b["vertices"])).collect();
         let blockers = Blockers::new(&blockers);
@@ -105,7 +105,7 @@ fn catalogue_18_polygons_behind_blockers() {
 #[test]
 fn catalogue_16_and_19_elements() {
     let mut count = 0;
-    for case in cases(include_str!("data/view_factors.json")) {
+    for case in cases(include_str!("../data/view_factors.json")) {
         let Some([element, other]) =
             case["surfaces"].as_array().and_then(|s| <&[Value; 2]>::try_from(s.as_slice()).ok())
         else {

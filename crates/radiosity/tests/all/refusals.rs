@@ -1,11 +1,8 @@
 //! Edits that cannot be are refused by name, with nothing changed.
 
-#[path = "common/small.rs"]
-mod small;
-
+use crate::small::small;
 use radiosity::cornell_box;
 use radiosity::session::{Edit, EditError, Form, LightId, MOST_EDITS, NewObject, ObjectId, Session, SessionOptions};
-use small::small;
 
 /// What no object can be is refused, with nothing changed.
 #[test]

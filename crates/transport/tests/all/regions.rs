@@ -1,17 +1,13 @@
 //! Automatic regions (catalogue 93): office buildings against the partition by hand, the laws that localization needs,
 //! and input that makes no rooms.
 
-#[path = "rooms/building.rs"]
-mod building;
-mod rooms;
-
-use building::{Building, Plan};
+use crate::building::{Building, Plan};
+use crate::rooms::{add_cut, box_of, room_with_block};
 use glam::{DQuat, DVec3};
 use radiosity_scene::{Enclosure, Facet};
 use radiosity_trace::sampling::Random;
 use radiosity_trace::{Ray, Tree};
 use radiosity_transport::{RegionOptions, Regions, regions};
-use rooms::{add_cut, box_of, room_with_block};
 
 /// Thickness of walls, m: solid ones and sheets.
 const WALLS: [f64; 2] = [0.2, 0.0];

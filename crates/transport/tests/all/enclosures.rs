@@ -125,7 +125,7 @@ fn polygons(list: &Value) -> Option<Vec<Facet>> {
 /// Every planar reference with blockers, decade by decade: the stated error holds the true one and meets the asked one.
 #[test]
 fn catalogue_18_references_with_blockers() {
-    let data: Value = serde_json::from_str(include_str!("data/view_factors_occluded.json")).unwrap();
+    let data: Value = serde_json::from_str(include_str!("../data/view_factors_occluded.json")).unwrap();
     let mut cases = 0;
     for case in data["cases"].as_array().unwrap() {
         let (Some(surfaces), Some(blockers)) = (polygons(&case["surfaces"]), polygons(&case["blockers"])) else {
@@ -148,7 +148,7 @@ fn catalogue_18_references_with_blockers() {
 /// Unoccluded references to 1e-8, by the default.
 #[test]
 fn catalogue_21_references_without_blockers() {
-    let data: Value = serde_json::from_str(include_str!("data/view_factors.json")).unwrap();
+    let data: Value = serde_json::from_str(include_str!("../data/view_factors.json")).unwrap();
     let mut cases = 0;
     for case in data["cases"].as_array().unwrap() {
         let Some(surfaces) = polygons(&case["surfaces"]).filter(|s| s.len() == 2) else { continue };

@@ -1,25 +1,14 @@
 //! What is read from a session: layers of light that add up and are of one state, its error, and places.
 
-#[path = "common/finish.rs"]
-mod finish;
-#[path = "common/furnace.rs"]
-mod furnace;
-#[path = "common/furnished.rs"]
-mod furnished;
-#[path = "common/room.rs"]
-mod room;
-#[path = "common/small.rs"]
-mod small;
-
-use finish::finish;
-use furnace::furnace;
-use furnished::furnished;
+use crate::finish::finish;
+use crate::furnace::furnace;
+use crate::furnished::furnished;
+use crate::room::{Furnishing, room};
+use crate::small::small;
 use radiosity::session::{
     Edit, Form, Layer, LightId, LightKind, NewObject, ObjectId, Session, SessionOptions, SurfacePlace,
 };
 use radiosity::{Bands, Mesh, Side, Solution, SolveOptions, Tracer, cornell_box, luminance};
-use room::{Furnishing, room};
-use small::small;
 use std::time::Duration;
 
 fn at(object: ObjectId, triangle: u32) -> SurfacePlace {

@@ -1,14 +1,7 @@
 //! Light measured at places on surfaces: against closed forms, and what it says of the picture.
 
-#[path = "common/finish.rs"]
-mod finish;
-#[path = "common/furnace.rs"]
-mod furnace;
-#[path = "common/room.rs"]
-mod room;
-
-use finish::finish;
-use furnace::furnace;
+use crate::finish::finish;
+use crate::furnace::furnace;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 use radiosity::session::{
     Edit, Layer, LightId, NewLight, ObjectId, Session, SessionOptions, SurfacePlace, Survey, Surveyed,

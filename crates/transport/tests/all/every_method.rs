@@ -1,13 +1,11 @@
 //! What holds for every method of form factors: sums of rows, unequal areas, grouping, and agreement past obstacles.
 
-mod rooms;
-
+use crate::rooms::{box_of, rectangle, room_with_block};
 use glam::DVec3;
 use radiosity_scene::Enclosure;
 use radiosity_transport::row::Look;
 use radiosity_transport::view_factors::ViewFactorOptions;
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors, PairMethod};
-use rooms::{box_of, rectangle, room_with_block};
 
 fn options(resolution: usize) -> FormFactorOptions {
     let look = Look { resolution, points: 2, ..Look::default() };

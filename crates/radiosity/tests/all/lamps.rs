@@ -1,21 +1,12 @@
 //! Lamps without area come and go, are turned, and become others: their light is, to the last bit, that of a session in which they were
 //! always so.
 
-#[path = "common/bits.rs"]
-mod bits;
-#[path = "common/finish.rs"]
-mod finish;
-#[path = "common/full.rs"]
-mod full;
-#[path = "common/small.rs"]
-mod small;
-
-use bits::bits;
-use finish::finish;
-use full::full;
+use crate::bits::bits;
+use crate::finish::finish;
+use crate::full::full;
+use crate::small::small;
 use radiosity::session::{Edit, EditError, LightId, LightKind, NewLight, Session, SessionOptions};
 use radiosity::{Bands, PointLight, PointLightKind, Scene, cornell_box};
-use small::small;
 use std::time::Duration;
 
 /// The scene of a lamp of a kind, straight from a file: what [`Edit::ChangeLight`] is to lead to.

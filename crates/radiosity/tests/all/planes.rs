@@ -1,14 +1,8 @@
 //! Measuring grids in the air: against closed forms, a furnace and `measure`, and after edits.
 
-#[path = "common/finish.rs"]
-mod finish;
-#[path = "common/furnace.rs"]
-mod furnace;
-#[path = "common/room.rs"]
-mod room;
-
-use finish::finish;
-use furnace::furnace;
+use crate::finish::finish;
+use crate::furnace::furnace;
+use crate::room::{Furnishing, room};
 use glam::{DMat4, DVec3};
 use radiosity::session::{
     Edit, LightId, ObjectId, Plane, PlaneError, PlaneFigures, PlaneQuestion, PlaneReading, Session, SessionOptions,
@@ -16,7 +10,6 @@ use radiosity::session::{
 use radiosity::{
     MeasureOptions, Mesh, PointLight, PointLightKind, Scene, Sky, Tracer, cornell_box, luminance, measure,
 };
-use room::{Furnishing, room};
 use std::time::Duration;
 
 fn lit(scene: Scene, elements: usize) -> Session {
