@@ -13,7 +13,7 @@
 //! to 1.9 times as fast there, but 64 from each point, which are what there is to trace, 0.8 times.
 
 use crate::build::MAX_DEPTH;
-use crate::intersect::{Prepared, Widening};
+use crate::intersect::Prepared;
 use crate::tree::{Block, Child, LANES, Node, Tree, WIDTH};
 use crate::{Hit, Ray};
 use std::arch::x86_64::*;
@@ -66,13 +66,11 @@ impl Stack<'_> {
 struct Lanes {
     origin: [__m256; 3],
     inverse: [__m256; 3],
-    /// How distances of boxes are widened: [`Widening::parts`].
     least: __m256,
     add: __m256,
-    pad: [__m256; 3],
     /// Offsets of the rows of bounds through which the ray enters and leaves, in numbers.
-    near: [usize; 3],
-    far: [usize; 3],
+    enter: [usize; 3],
+    leave: [usize; 3],
     shear: [__m128; 2],
     corner: [__m128; 3],
     scale: __m256d,
@@ -87,15 +85,13 @@ impl Lanes {
     fn new(ray: &Prepared) -> Lanes {
         let three = |x: [f32; 3]| [_mm256_set1_ps(x[0]), _mm256_set1_ps(x[1]), _mm256_set1_ps(x[2])];
         let [kx, ky, kz] = ray.axes;
-        let (least, add, pad) = ray.widening.parts();
         Lanes {
             origin: three(ray.origin),
             inverse: three(ray.inverse),
-            least: _mm256_set1_ps(least),
-            add: _mm256_set1_ps(add),
-            pad: three(pad),
-            near: ray.rows.map(|row| row * WIDTH),
-            far: ray.rows.map(|row| (if row < 3 { row + 3 } else { row - 3 }) * WIDTH),
+            least: _mm256_set1_ps(ray.least),
+            add: _mm256_set1_ps(ray.add),
+            enter: ray.rows.map(|row| row * WIDTH),
+            leave: ray.rows.map(|row| (if row < 3 { row + 3 } else { row - 3 }) * WIDTH),
             shear: [_mm_set1_ps(ray.shear[0]), _mm_set1_ps(ray.shear[1])],
             corner: [_mm_set1_ps(ray.origin[kx]), _mm_set1_ps(ray.origin[ky]), _mm_set1_ps(ray.origin[kz])],
             scale: _mm256_set1_pd(f64::from(ray.scale)),
@@ -108,22 +104,17 @@ impl Lanes {
     /// Bits of the boxes met no later than `limit`, which has been widened, and the distances of all.
     #[inline]
     #[target_feature(enable = "avx2,fma")]
-    fn boxes<const LEVEL: bool>(&self, node: &Node, limit: __m256) -> (u32, __m256) {
+    fn boxes(&self, node: &Node, limit: __m256) -> (u32, __m256) {
         let rows: *const f32 = node.bounds.as_ptr().cast();
         let (mut near, mut far) = (self.least, limit);
         for axis in 0..3 {
             // SAFETY: both offsets are row × 8 with row < 6, so eight numbers lie there.
             let (enter, leave) =
-                unsafe { (_mm256_loadu_ps(rows.add(self.near[axis])), _mm256_loadu_ps(rows.add(self.far[axis]))) };
+                unsafe { (_mm256_loadu_ps(rows.add(self.enter[axis])), _mm256_loadu_ps(rows.add(self.leave[axis]))) };
             let enter = _mm256_sub_ps(enter, self.origin[axis]);
             let leave = _mm256_sub_ps(leave, self.origin[axis]);
-            if LEVEL {
-                near = _mm256_max_ps(_mm256_fmsub_ps(enter, self.inverse[axis], self.pad[axis]), near);
-                far = _mm256_min_ps(_mm256_fmadd_ps(leave, self.inverse[axis], self.pad[axis]), far);
-            } else {
-                near = _mm256_max_ps(_mm256_mul_ps(enter, self.inverse[axis]), near);
-                far = _mm256_min_ps(_mm256_fmadd_ps(leave, self.inverse[axis], self.add), far);
-            }
+            near = _mm256_max_ps(_mm256_mul_ps(enter, self.inverse[axis]), near);
+            far = _mm256_min_ps(_mm256_fmadd_ps(leave, self.inverse[axis], self.add), far);
         }
         (_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32, near)
     }
@@ -216,34 +207,11 @@ impl Candidate {
 
 #[target_feature(enable = "avx2,fma")]
 pub(crate) fn closest(tree: &Tree, ray: &Ray, accept: &mut impl FnMut(u32, f32, f32, bool) -> bool) -> Option<Hit> {
-    let prepared = tree.prepared(ray)?;
-    match prepared.widening {
-        Widening::Steep { .. } => closest_as::<false>(tree, prepared, accept),
-        Widening::Level(_) => closest_level(tree, ray, accept),
-    }
-}
-
-/// Level rays are rare: apart from the others, and made ready again, so that the compiler keeps the others in registers. With one walk for
-/// both a Cornell box had a tenth fewer rays a second.
-#[cold]
-#[inline(never)]
-#[target_feature(enable = "avx2,fma")]
-fn closest_level(tree: &Tree, ray: &Ray, accept: &mut impl FnMut(u32, f32, f32, bool) -> bool) -> Option<Hit> {
-    closest_as::<true>(tree, tree.prepared(ray)?, accept)
-}
-
-#[inline]
-#[target_feature(enable = "avx2,fma")]
-fn closest_as<const LEVEL: bool>(
-    tree: &Tree,
-    ray: Prepared,
-    accept: &mut impl FnMut(u32, f32, f32, bool) -> bool,
-) -> Option<Hit> {
-    let (_, add, _) = ray.widening.parts();
+    let ray = tree.prepared(ray)?;
     let lanes = Lanes::new(&ray);
     let mut best = Candidate { key: f32::INFINITY, t: 0.0, triangle: u32::MAX, v: 0.0, w: 0.0, det: 0.0 };
     // The least key so far, or the ray's end, widened: boxes behind it are not opened.
-    let mut limit = ray.t_max + add;
+    let mut limit = ray.t_max + ray.add;
     let mut place = [const { MaybeUninit::uninit() }; STACK];
     let mut stack = Stack { place: &mut place, len: 0 };
     let mut child = Child::node(0);
@@ -255,14 +223,14 @@ fn closest_as<const LEVEL: bool>(
                     let Hit { triangle, u, v, back, .. } = found.hit();
                     if nearer && accept(triangle, u, v, back) {
                         best = found;
-                        limit = limit.min(found.key + add);
+                        limit = limit.min(found.key + ray.add);
                     }
                     false
                 });
             }
         } else {
             let node = &tree.nodes[child.index()];
-            let (mut mask, near) = lanes.boxes::<LEVEL>(node, _mm256_set1_ps(limit));
+            let (mut mask, near) = lanes.boxes(node, _mm256_set1_ps(limit));
             if mask != 0 {
                 let mut distance = [0.0f32; WIDTH];
                 // SAFETY: eight numbers fit.
@@ -306,30 +274,9 @@ fn closest_as<const LEVEL: bool>(
 
 #[target_feature(enable = "avx2,fma")]
 pub(crate) fn blocked(tree: &Tree, ray: &Ray, accept: &mut impl FnMut(u32, f32, f32, bool) -> bool) -> bool {
-    let Some(prepared) = tree.prepared(ray) else { return false };
-    match prepared.widening {
-        Widening::Steep { .. } => blocked_as::<false>(tree, prepared, accept),
-        Widening::Level(_) => blocked_level(tree, ray, accept),
-    }
-}
-
-#[cold]
-#[inline(never)]
-#[target_feature(enable = "avx2,fma")]
-fn blocked_level(tree: &Tree, ray: &Ray, accept: &mut impl FnMut(u32, f32, f32, bool) -> bool) -> bool {
-    tree.prepared(ray).is_some_and(|prepared| blocked_as::<true>(tree, prepared, accept))
-}
-
-#[inline]
-#[target_feature(enable = "avx2,fma")]
-fn blocked_as<const LEVEL: bool>(
-    tree: &Tree,
-    ray: Prepared,
-    accept: &mut impl FnMut(u32, f32, f32, bool) -> bool,
-) -> bool {
-    let (_, add, _) = ray.widening.parts();
+    let Some(ray) = tree.prepared(ray) else { return false };
     let lanes = Lanes::new(&ray);
-    let limit = _mm256_set1_ps(ray.t_max + add);
+    let limit = _mm256_set1_ps(ray.t_max + ray.add);
     let mut place = [const { MaybeUninit::uninit() }; STACK];
     let mut stack = Stack { place: &mut place, len: 0 };
     let mut child = Child::node(0);
@@ -346,7 +293,7 @@ fn blocked_as<const LEVEL: bool>(
             }
         } else {
             let node = &tree.nodes[child.index()];
-            let (mut mask, _) = lanes.boxes::<LEVEL>(node, limit);
+            let (mut mask, _) = lanes.boxes(node, limit);
             while mask != 0 {
                 stack.push(u64::from(node.child[mask.trailing_zeros() as usize % WIDTH].0));
                 mask &= mask - 1;

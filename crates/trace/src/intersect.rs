@@ -8,42 +8,37 @@
 //! of the largest coordinate (in f32 it loses all digits on slivers: 0.5 mm on one of 3 m by 1 mm).
 //!
 //! The tree finds what trying every triangle finds, bit for bit, because a box is never entered later than the distance
-//! computed for a point inside it of a triangle. What that may be off by grows with the distance, for which rays become
-//! wider by [`CONE`], and with the triangle, for which boxes are larger by [`SLACK`] and begin earlier by [`MARGIN`]. It does not grow
+//! computed for a point inside it of a triangle. What that may be off by grows with the distance ([`CONE`]) and with the triangle ([`SLACK`], [`MARGIN`]). It does not grow
 //! with the scene: where boxes are widened by what is enough at its far end, rays meet everything that lies in the plane they start from, and
-//! find a tenth fewer hits a second in a Cornell box and a fifth fewer in a large building. Multiplication and addition of the triangle
+//! find a tenth fewer hits a second in a Cornell box and a quarter fewer in a large building. Multiplication and addition of the triangle
 //! test are never fused, or processors would disagree.
 
 use crate::{Hit, Ray};
 use glam::Vec3;
 
-/// Rays become wider by this part of the way along them.
+/// Boxes are entered earlier and left later by this part of the way along the axis on which the ray is steepest.
 ///
-/// With u = 2^-24, t the way along the axis z on which the ray is steepest, s the shear and D[a] the extent of a triangle along an axis a: its corners lie no further
-/// than t + D[z] away along z and, where the ray meets what is between them, no further sideways than D[a] + s D[z] once sheared. A sheared
-/// coordinate is off by up to u (t + D[a]) for the corner, u s (t + D[z]) for the product and u (D[a] + s D[z]) for the difference. What depths
-/// are off by moves along the ray. The rounded shear turns it by 2 u, the distance is rounded by 2 u t and that of a box by 4 u t. Together that
-/// is 10 u t, of which this is three times; 2 u D[a], of which [`SLACK`] is twice; and 2 u s D[z], which is as much on each axis for the way along z:
-/// [`MARGIN`] is one and a half times that. Tests fail without the first or the last.
-const CONE: f32 = 1.0 / (1 << 19) as f32;
+/// With u = 2^-24, z that axis, t the way along it, s the shear of a sideways axis a and D[a] the extent of a triangle along it: where the ray meets what is between
+/// the corners these are, weighted as the hit is, s t + D[a] away along a and t + D[z] along z, and no further sideways than D[a] + s D[z] once sheared. A sheared
+/// coordinate is off by up to u (s t + D[a]) for the corner, u s (t + D[z]) for the product and u (D[a] + s D[z]) for the difference; a depth by u (t + D[z]), which
+/// counts along z alone, as it moves the hit along the ray. The rounded shear turns the ray by 2 u s, its distance is rounded by 2 u, that of a box by 4 u. Together, over
+/// what the ray moves along a, that is 10 u t along z on any axis, of which this is 1.6 times; 2 u D[a], of which [`SLACK`] is twice; and 2 u D[z] along z,
+/// of which [`MARGIN`] is one and a half times. Tests fail without any of the three.
+const CONE: f32 = 1.0 / (1 << 20) as f32;
 
 /// Boxes are larger than what they hold by this part of its extent, along each axis.
 pub(crate) const SLACK: f32 = 1.0 / (1 << 22) as f32;
 
-/// Boxes begin earlier and end later by this part of the scene's largest extent, along the axis on which the ray is steepest: less
-/// than the [`Tracer`](crate::Tracer) moves origins off their surfaces, so that rays do not look whether they meet a wall they start from.
+/// Boxes are entered earlier and left later by this part of the scene's largest extent, along the same axis: 3 u, less
+/// than the 4 u that the [`Tracer`](crate::Tracer) moves origins off their surfaces, so that rays do not look whether they meet a wall they start from.
 const MARGIN: f32 = 3.0 / (1 << 24) as f32;
-
-/// A ray that is steeper along one axis than along another by more than this is level along that one.
-const LEVEL: f32 = 256.0;
 
 /// Hits on backs compete as if they lay further by this part of the largest coordinate of the scene, so that the front
 /// of a wall without thickness is met and not its back. Sixteen units in the last place: more than the distances of two
 /// faces in one plane can differ, less than any wall that was modelled with a thickness.
 const TIE: f32 = 1.0 / (1 << 20) as f32;
 
-/// Direction components smaller than this are taken as this in the test of boxes, which keeps infinities out; a ray
-/// leaves its line by less than its width in any distance that can be hit.
+/// Rays are at least so long along the axis on which they are steepest.
 const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
 
 /// Rays and scenes reach no further than this, so that no product overflows.
@@ -79,31 +74,14 @@ pub(crate) struct Prepared {
     pub scale: f32,
     /// What backs are set back by.
     pub tie: f32,
-    /// One over the direction, signs kept, magnitudes at most 2^60.
+    /// One over the direction, signs kept, magnitudes at most 2^126.
     pub inverse: [f32; 3],
-    pub widening: Widening,
+    /// A box that is entered at e and left at l, the largest and the least of three distances, is met where max(e, `least`) is at most min(l, end of the
+    /// ray) + `add`. `least` is a little less than `add`: by what may lie behind the origin.
+    pub least: f32,
+    pub add: f32,
     /// Per axis, the row of a node's bounds that the ray enters through; it leaves through the row 3 further, modulo 6.
     pub rows: [usize; 3],
-}
-
-/// What the distances e and l at which a ray enters and leaves a box, each for three axes, are widened by.
-#[derive(Clone, Copy)]
-pub(crate) enum Widening {
-    /// The box is met where max(e, near) is at most min(l, end of the ray) + far: one number for all axes, and another for what is behind the origin.
-    Steep { near: f32, far: f32 },
-    /// The box is met where max(e - pad, 0) is at most min(l + pad, end of the ray): along an axis on which a ray is level one number for all would be too large.
-    Level([f32; 3]),
-}
-
-impl Widening {
-    /// (The least distance of entering, what is added to leaving and to the ray's end, what leaving has more along each axis and entering less).
-    #[inline(always)]
-    pub fn parts(&self) -> (f32, f32, [f32; 3]) {
-        match *self {
-            Widening::Steep { near, far } => (near, far, [0.0; 3]),
-            Widening::Level(pad) => (0.0, 0.0, pad),
-        }
-    }
 }
 
 impl Prepared {
@@ -128,30 +106,29 @@ impl Prepared {
         // without branches: where a ray goes nobody guesses.
         let first = usize::from(steep[0] <= steep[1]);
         let z = if steep[0].max(steep[1]) > steep[2] { first } else { 2 };
-        if steep[z] < SMALLEST {
+        let steepest = steep[0].max(steep[1]).max(steep[2]);
+        if steepest < SMALLEST {
             return None;
         }
         let [x, y] = ACROSS[z][usize::from(d[z] < 0.0)];
 
-        let inverse = d.map(|d| 1.0 / d.abs().max(SMALLEST).copysign(d));
-        let least_steep = inverse[0].abs().max(inverse[1].abs()).max(inverse[2].abs());
-        let widening = if least_steep * steep[z] > LEVEL {
-            Widening::Level(inverse.map(|inverse| reach * CONE * inverse.abs()))
-        } else {
-            let margin = MARGIN * (hi - lo).max_element() * inverse[z].abs();
-            let far = 2.0 * (CONE * reach.min(ray.t_max * steep[z]) * least_steep + margin);
-            Widening::Steep { near: far - margin, far }
-        };
+        // Infinities are kept out, which would be no number where a box begins at the origin.
+        let inverse = d.map(|d| 1.0 / d.abs().max(f32::MIN_POSITIVE).copysign(d));
+        // Not by their numbers from arrays, for which a processor waits until these are in memory.
+        let (scale, over) = (1.0 / d[z], 1.0 / steepest);
+        let margin = MARGIN * (hi - lo).max_element() * over;
+        let add = 2.0 * (CONE * reach.min(ray.t_max * steepest) * over + margin);
         Some(Prepared {
             origin: ray.origin.to_array(),
             t_max: ray.t_max,
             skip: ray.skip,
             axes: [x, y, z],
-            shear: [d[x] * inverse[z], d[y] * inverse[z]],
-            scale: inverse[z],
+            shear: [d[x] * scale, d[y] * scale],
+            scale,
             tie,
             inverse,
-            widening,
+            least: add - margin,
+            add,
             rows: std::array::from_fn(|axis| axis + 3 * usize::from(d[axis].is_sign_negative())),
         })
     }

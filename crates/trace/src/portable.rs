@@ -31,13 +31,12 @@ pub(crate) fn blocked(tree: &Tree, ray: &Prepared, accept: &mut impl FnMut(u32, 
     found
 }
 
-/// Shows `found` every hit in a box that begins no later than `limit`, which it may lower; it ends the walk by `true`.
+/// Shows `found` every hit in a box that begins no later than `limit`, as boxes are widened, which it may lower; it ends the walk by `true`.
 fn walk(tree: &Tree, ray: &Prepared, limit: &mut f32, mut found: impl FnMut(Hit, &mut f32) -> bool) {
-    let (least, add, pad) = ray.widening.parts();
     // (distance at which the box is entered, what it contains), the nearest last
     let mut stack = vec![(0.0, Child::node(0))];
     while let Some((near, child)) = stack.pop() {
-        if near > *limit + add {
+        if near > *limit + ray.add {
             continue;
         }
         if child.is_leaf() {
@@ -53,12 +52,12 @@ fn walk(tree: &Tree, ray: &Prepared, limit: &mut f32, mut found: impl FnMut(Hit,
             let node = &tree.nodes[child.index()];
             let first = stack.len();
             for slot in 0..WIDTH {
-                let (mut near, mut far) = (least, *limit + add);
-                for (axis, &pad) in pad.iter().enumerate() {
+                let (mut near, mut far) = (ray.least, *limit + ray.add);
+                for axis in 0..3 {
                     let (enter, leave) = (ray.rows[axis], (ray.rows[axis] + 3) % 6);
                     let distance = |row: usize| (node.bounds[row][slot] - ray.origin[axis]) * ray.inverse[axis];
-                    near = near.max(distance(enter) - pad);
-                    far = far.min(distance(leave) + pad + add);
+                    near = near.max(distance(enter));
+                    far = far.min(distance(leave) + ray.add);
                 }
                 if near <= far {
                     stack.push((near, node.child[slot]));
