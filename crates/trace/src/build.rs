@@ -110,7 +110,7 @@ pub(crate) struct Bounds {
 impl Bounds {
     pub const EMPTY: Bounds = Bounds { lo: Vec4::splat(f32::INFINITY), hi: Vec4::splat(f32::NEG_INFINITY) };
 
-    /// With the slack of a triangle of these extents. Finite, and rounded outwards by at least a unit in the last place, but the same along axes without extent.
+    /// With the slack of a triangle of these extents, rounded outwards by at least a unit in the last place; the same along axes without extent.
     pub fn slackened(self, extent: Vec3) -> Bounds {
         let down = |p: Vec4, axis: usize| match extent[axis] {
             0.0 => p[axis],
