@@ -335,10 +335,11 @@ impl Live {
             if own.is_empty() {
                 break true;
             }
-            let started = Instant::now();
+            let (started, is_full) = (Instant::now(), own.len() == batch);
             rays += own.par_iter_mut().with_max_len(1).map(|chunk| chunk.work(&work, part)).sum::<u64>();
             let took = started.elapsed();
-            if took < PIECE / 2 {
+            // What was not full tells nothing of larger ones; doubled again and again it would overflow.
+            if took < PIECE / 2 && is_full {
                 batch *= 2;
             } else if took > 2 * PIECE {
                 batch = (batch / 2).max(2 * rayon::current_num_threads());
