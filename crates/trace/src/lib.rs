@@ -13,6 +13,7 @@ pub mod emitters;
 mod intersect;
 mod portable;
 pub mod ray;
+mod shaft;
 mod spatial;
 pub mod tree;
 
@@ -24,4 +25,4 @@ pub use tree::{Flaw, Tree};
 pub mod sampling;
 pub mod surface;
 
-pub use surface::{Fan, Found, Place, Tracer};
+pub use surface::{Blocker, Fan, Found, Place, Tracer, quadrilateral};

@@ -6,10 +6,13 @@
 //! scene's coordinates, which is all the bias there is.
 
 use crate::sampling::{hash, unit};
+use crate::shaft::Shaft;
 use crate::{Hit, Ray, Tree};
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{AlphaMode, Mesh, Scene, Side};
 use rayon::prelude::*;
+use smallvec::SmallVec;
+use std::ops::ControlFlow;
 
 /// Hits are at an edge when they lie within so many offsets of it; distances of what meets there are told apart no better
 /// (backs are set back by two offsets).
@@ -98,6 +101,67 @@ pub struct Tracer<'a> {
 struct Kind {
     double_sided: bool,
     see_through: bool,
+    joins: Joins,
+}
+
+/// Whether a triangle makes a flat convex quadrilateral with one beside it in the list.
+#[derive(Clone, Copy, PartialEq)]
+enum Joins {
+    None,
+    /// With the one that follows.
+    First,
+    /// With the one before.
+    Last,
+}
+
+/// A convex polygon of three or four corners that stops light.
+#[derive(Clone, Copy, Debug)]
+pub struct Blocker {
+    number: u32,
+    count: u32,
+    corners: [DVec3; 4],
+}
+
+impl Blocker {
+    /// A triangle, with the next one if the two make a quadrilateral.
+    fn new(mesh: &Mesh, number: u32, is_joined: bool) -> Blocker {
+        let [a, b, c] = mesh.corners(number as usize);
+        let alone = Blocker { number, count: 3, corners: [a, b, c, c] };
+        if !is_joined {
+            return alone;
+        }
+        flat_quadrilateral(mesh, number as usize, f64::INFINITY).map_or(alone, |corners| Blocker {
+            number,
+            count: 4,
+            corners,
+        })
+    }
+
+    /// Its corners.
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners[..self.count as usize]
+    }
+}
+
+/// The corners of the convex quadrilateral that two triangles make which face the same way, if they have an edge in common.
+pub fn quadrilateral(first: [DVec3; 3], second: [DVec3; 3]) -> Option<[DVec3; 4]> {
+    let shares = |&(i, j): &(usize, usize)| first[i] == second[(j + 1) % 3] && first[(i + 1) % 3] == second[j];
+    let (i, j) = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).find(shares)?;
+    let corners = [first[i], second[(j + 2) % 3], first[(i + 1) % 3], first[(i + 2) % 3]];
+    let normal = (first[1] - first[0]).cross(first[2] - first[0]);
+    let turns = |k: usize| {
+        let [p, q, r] = [k, k + 1, k + 2].map(|k| corners[k % 4]);
+        (q - p).cross(r - q).dot(normal) > 0.0
+    };
+    (0..4).all(turns).then_some(corners)
+}
+
+/// That of a triangle and the next one, if it is flat to within a distance.
+fn flat_quadrilateral(mesh: &Mesh, triangle: usize, flat: f64) -> Option<[DVec3; 4]> {
+    let (first, second) = (mesh.triangles[triangle], mesh.triangles.get(triangle + 1)?);
+    let common = first.iter().filter(|v| second.contains(v)).count();
+    let corners = (common == 2).then(|| quadrilateral(mesh.corners(triangle), mesh.corners(triangle + 1))).flatten()?;
+    ((corners[1] - corners[0]).dot(mesh.normal(triangle)).abs() <= flat).then_some(corners)
 }
 
 impl<'a> Tracer<'a> {
@@ -114,7 +178,7 @@ impl<'a> Tracer<'a> {
         // the intersection test add about as much again. Eight times that clears the surface with certainty and
         // is still a few micrometres in a room.
         let offset = half * 2f64.powi(-21);
-        let kind: Vec<Kind> = mesh
+        let mut kind: Vec<Kind> = mesh
             .source
             .par_iter()
             .map(|&source| {
@@ -127,9 +191,10 @@ impl<'a> Tracer<'a> {
                             || material.base_color_texture.is_some_and(|t| !scene.textures[t.texture].is_opaque())
                     }
                 };
-                Kind { double_sided: material.has_two_sides(), see_through }
+                Kind { double_sided: material.has_two_sides(), see_through, joins: Joins::None }
             })
             .collect();
+        join(&mut kind, mesh, offset);
         Tracer {
             scene,
             mesh,
@@ -268,7 +333,7 @@ impl<'a> Tracer<'a> {
         let begin = (distance - margin).max(0.0);
         let around = Ray { origin: ray.origin + begin * ray.direction, t_max: distance + sinks - begin, ..*ray };
         let back = self.tree.closest_where(&around, |t, _, _, back| {
-            let Kind { double_sided, see_through } = self.kind[t as usize];
+            let Kind { double_sided, see_through, .. } = self.kind[t as usize];
             back && !double_sided && !see_through && self.normals[t as usize].dot(flat) < -FLAT
         })?;
         let gone = back.t.max(distance - begin) + margin;
@@ -278,6 +343,33 @@ impl<'a> Tracer<'a> {
     /// What people mean to touch lies no further apart than this, metres: a tenth of a per mille of the scene's size, at most one millimetre.
     pub fn reach(&self) -> f64 {
         (self.mesh.tolerance * 100.0).min(1e-3)
+    }
+
+    /// Finds what may stand between two convex polygons, the first of which may be a point, opaque as it is and other than a triangle
+    /// that the first lies on: up to `most`, each once. Whether these are all, and there are no others that let some light pass.
+    pub fn blockers(&self, (from, own): (&[DVec3], u32), to: &[DVec3], most: usize, found: &mut Vec<Blocker>) -> bool {
+        let moved = |polygon: &[DVec3]| polygon.iter().map(|p| *p - self.centre).collect::<SmallVec<[DVec3; 8]>>();
+        let shaft = Shaft::new(&moved(from), &moved(to));
+        let own = if (own as usize) < self.kind.len() { self.first_of(own) } else { u32::MAX };
+        let first = found.len();
+        let all = self.tree.in_shaft(&shaft, &mut |triangle| {
+            let kind = self.kind[triangle as usize];
+            let number = self.first_of(triangle);
+            if number == own || found[first..].iter().any(|known| known.number == number) {
+                return ControlFlow::Continue(());
+            }
+            if kind.see_through || found.len() - first == most {
+                return ControlFlow::Break(());
+            }
+            found.push(Blocker::new(self.mesh, number, kind.joins != Joins::None));
+            ControlFlow::Continue(())
+        });
+        all.is_continue()
+    }
+
+    /// The first triangle of the quadrilateral that a triangle is a part of; itself where it is of none.
+    fn first_of(&self, triangle: u32) -> u32 {
+        if self.kind[triangle as usize].joins == Joins::Last { triangle - 1 } else { triangle }
     }
 
     /// Whether two places see each other. The far end is moved off its surface like the near one, so that neither
@@ -313,6 +405,18 @@ impl<'a> Tracer<'a> {
         let at = self.mesh.surface(triangle as usize, DVec2::new(f64::from(u), f64::from(v)));
         let opacity = self.scene.opacity(at);
         opacity >= 1.0 || (opacity > 0.0 && unit(hash(seed ^ hash(triangle))) < opacity)
+    }
+}
+
+/// Joins triangles that follow each other to quadrilaterals.
+fn join(kind: &mut [Kind], mesh: &Mesh, flat: f64) {
+    let joins: Vec<bool> =
+        (0..kind.len()).into_par_iter().map(|triangle| flat_quadrilateral(mesh, triangle, flat).is_some()).collect();
+    for triangle in 1..kind.len() {
+        let is_like = kind[triangle] == kind[triangle - 1] && !kind[triangle].see_through;
+        if joins[triangle - 1] && is_like {
+            (kind[triangle - 1].joins, kind[triangle].joins) = (Joins::First, Joins::Last);
+        }
     }
 }
 
