@@ -21,6 +21,19 @@ const MOST_RAYS: u32 = 1 << 16;
 pub(crate) const GATHERED_POWER: f64 = 1.0;
 pub(crate) const DIRECT_POWER: f64 = 1.4;
 
+/// Light of some receivers, lx per band, and which of it is known without any chance.
+pub(crate) struct Lit {
+    pub light: Vec<Bands>,
+    pub is_exact: Vec<bool>,
+}
+
+impl Lit {
+    /// None of it.
+    pub fn sampled(light: Vec<Bands>) -> Lit {
+        Lit { is_exact: vec![false; light.len()], light }
+    }
+}
+
 /// What rays found so far.
 #[derive(Default)]
 pub(crate) struct Found {
@@ -32,14 +45,36 @@ pub(crate) struct Found {
 }
 
 impl Found {
+    /// By a half of so many rays, and another one of those that need it. `evened` makes standard errors, lx, of the light and what halves
+    /// differ by from it, which is no number where it is known that they do not.
+    ///
+    /// # Errors
+    /// Those of the second half.
+    pub fn of_lit(
+        Lit { light: mut first, is_exact }: Lit,
+        second: impl FnOnce(&[usize]) -> Result<Lit, Error>,
+        rays: u32,
+        evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>,
+    ) -> Result<Found, Error> {
+        let unsure: Vec<usize> = (0..first.len()).filter(|i| !is_exact[*i]).collect();
+        let mut apart = vec![f32::NAN; first.len()];
+        for (&i, other) in unsure.iter().zip(second(&unsure)?.light) {
+            let half = first[i];
+            apart[i] = halved([half, other]);
+            first[i] = mean([half, other]);
+        }
+        let mut noise = evened(&first, &apart);
+        is_exact.iter().zip(&mut noise).filter(|(is_exact, _)| **is_exact).for_each(|(_, noise)| *noise = 0.0);
+        Ok(Found { rays: vec![rays; first.len()], light: first, noise })
+    }
+
     /// By two halves, of so many rays together. `evened` makes standard errors, lx, of the light and what halves differ by from it.
     pub fn of_halves(
         halves: impl IntoIterator<Item = [Bands; 2]>,
         rays: u32,
         evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>,
     ) -> Found {
-        let apart = |[a, b]: [Bands; 2]| 0.5 * luminance(std::array::from_fn(|k| (a[k] - b[k]).abs()));
-        let (light, apart): (Vec<Bands>, Vec<f32>) = halves.into_iter().map(|both| (mean(both), apart(both))).unzip();
+        let (light, apart): (Vec<Bands>, Vec<f32>) = halves.into_iter().map(|both| (mean(both), halved(both))).unzip();
         let noise = evened(&light, &apart);
         Found { rays: vec![rays; light.len()], light, noise }
     }
@@ -49,7 +84,7 @@ impl Found {
     pub fn grow(
         &mut self,
         (times, power): (&[f64], f64),
-        mut send: impl FnMut(&[usize], u32) -> Result<Vec<Bands>, Error>,
+        mut send: impl FnMut(&[usize], u32) -> Result<Lit, Error>,
     ) -> Result<bool, Error> {
         let possible = |i: usize| (MOST_RAYS / self.rays[i].max(1)).checked_ilog2().unwrap_or(0);
         let doublings = |i: usize| (times[i].log2().round() as u32).min(MOST_DOUBLINGS).min(possible(i));
@@ -64,7 +99,12 @@ impl Found {
             // Those before and those that are added are a set each, and independent.
             let variance = f64::from(1.0 - part).powi(2)
                 + f64::from(part).powi(2) * (f64::from(had) / f64::from(more)).powf(power);
-            for (&i, new) in own.iter().zip(send(&own, more)?) {
+            let Lit { light, is_exact } = send(&own, more)?;
+            for ((&i, new), is_exact) in own.iter().zip(light).zip(is_exact) {
+                if is_exact {
+                    (self.light[i], self.noise[i], self.rays[i]) = (new, 0.0, all);
+                    continue;
+                }
                 self.light[i] = std::array::from_fn(|k| self.light[i][k] + part * (new[k] - self.light[i][k]));
                 self.noise[i] *= variance.sqrt() as f32;
                 self.rays[i] = all;
@@ -72,6 +112,11 @@ impl Found {
         }
         Ok(any)
     }
+}
+
+/// What two halves differ by from their mean.
+fn halved([a, b]: [Bands; 2]) -> f32 {
+    0.5 * luminance(std::array::from_fn(|k| (a[k] - b[k]).abs()))
 }
 
 /// The mean of two halves.

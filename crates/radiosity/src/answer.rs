@@ -1,5 +1,6 @@
 //! Reading a solution at points: direct light there and then, indirect light gathered or interpolated.
 
+use crate::allocation::Lit;
 use crate::monitor::{Monitor, Watch};
 use crate::{Error, Solution};
 use glam::DVec2;
@@ -129,7 +130,7 @@ impl Solution<'_> {
         shadowing: &Shadowing,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Bands>, Error> {
-        self.direct_by(places, shadowing, 0, monitor)
+        Ok(self.direct_by(places, shadowing, 0, monitor)?.light)
     }
 
     /// The same; each `salt` has shadow rays of its own.
@@ -139,7 +140,7 @@ impl Solution<'_> {
         shadowing: &Shadowing,
         salt: u32,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Bands>, Error> {
+    ) -> Result<Lit, Error> {
         let shaded: Vec<bool> = places.par_iter().map(|place| self.may_be_shaded(place)).collect();
         self.direct_of(&PointReceivers { places, shaded: &shaded, salt }, shadowing, monitor)
     }
@@ -150,11 +151,12 @@ impl Solution<'_> {
         receivers: &impl Receivers,
         shadowing: &Shadowing,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Bands>, Error> {
+    ) -> Result<Lit, Error> {
         let columns = self.stages.time(monitor, "direct light", || {
             self.luminaires.columns(self.tracer(), receivers, shadowing, &Watch(monitor))
         })?;
-        Ok((0..receivers.len()).map(|i| columns.mean(i)).collect())
+        let (light, is_exact) = (0..receivers.len()).map(|i| (columns.mean(i), columns.is_exact(i))).unzip();
+        Ok(Lit { light, is_exact })
     }
 
     /// Whether any light may be hidden from a place: whether any shadow ray of its cell was stopped. Of places in the open

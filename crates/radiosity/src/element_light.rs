@@ -1,5 +1,6 @@
 //! Light of elements that are finer than those that were solved for: means over their areas, by a final gather.
 
+use crate::allocation::Lit;
 use crate::measure::ENOUGH;
 use crate::points::{Asked, Light, Rays};
 use crate::{Error, Monitor, Solution};
@@ -84,7 +85,7 @@ impl Asked for Open<'_> {
         own: &[usize],
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Bands>, Error> {
+    ) -> Result<Lit, Error> {
         let shadowing = Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 };
         solution.direct_of(&Part { open: self, own, salt }, &shadowing, monitor)
     }

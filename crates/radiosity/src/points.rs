@@ -1,7 +1,7 @@
 //! Light of points and of elements: a few rays for each, then more for those whose first ones disagree ([`crate::allocation`]). All
 //! that were sent count, until another solution takes the place of the one that they looked up.
 
-use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth, mean};
+use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, Lit, curb, growth, mean};
 use crate::{Error, Monitor, Solution};
 use glam::DVec3;
 use radiosity_scene::{Bands, Side, luminance};
@@ -59,7 +59,7 @@ pub(crate) trait Asked {
         own: &[usize],
         rays: (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Bands>, Error>;
+    ) -> Result<Lit, Error>;
 
     /// What some of them gather, as two halves of the rays tell it.
     fn gathered(
@@ -99,7 +99,7 @@ impl Asked for &[Place] {
         own: &[usize],
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Bands>, Error> {
+    ) -> Result<Lit, Error> {
         solution.direct_by(&of(self, own), &shadowing(rays), salt, monitor)
     }
 
@@ -151,13 +151,10 @@ impl<A: Asked> Light<A> {
     pub fn begin(&mut self, solution: &Solution, [gather, shadow]: Rays, monitor: &dyn Monitor) -> Result<(), Error> {
         let began = Instant::now();
         let all: Vec<usize> = (0..self.asked.len()).collect();
-        let mut half = || {
-            self.sets += 1;
-            self.asked.direct(solution, &all, (shadow / 2, self.sets), monitor)
-        };
-        let halves = half()?.into_iter().zip(half()?).map(|(a, b)| [a, b]);
-        self.direct = Found::of_halves(halves, shadow as u32, evened);
-        self.sets += 1;
+        let sets = self.sets;
+        let half = |own: &[usize], set| self.asked.direct(solution, own, (shadow / 2, sets + set), monitor);
+        self.direct = Found::of_lit(half(&all, 1)?, |own| half(own, 2), shadow as u32, evened)?;
+        self.sets += 3;
         let halves = self.asked.gathered(solution, &all, (gather, self.sets), monitor)?;
         self.gathered = Found::of_halves(halves, gather as u32, evened);
         self.share();
@@ -192,7 +189,8 @@ impl<A: Asked> Light<A> {
         let mut times = growth(&spread(&self.pooled), &weights, &ceilings, of_gathered, for_gathered);
         curb(&mut times, most);
         let more_gathered = self.gathered.grow((&times, for_gathered), |own, rays| {
-            Ok(asked.gathered(solution, own, (rays as usize, set), monitor)?.into_iter().map(mean).collect())
+            let halves = asked.gathered(solution, own, (rays as usize, set), monitor)?;
+            Ok(Lit::sampled(halves.into_iter().map(mean).collect()))
         })?;
         self.share();
         self.seconds += began.elapsed().as_secs_f64();
@@ -264,11 +262,11 @@ impl<A: Asked> Light<A> {
     }
 }
 
-/// Shared direct light, but where no ray found any there is none: what is shared from beyond an edge of shadow, however little, would
+/// Shared direct light, but where it is known it stays as it is, and where no ray found any there is none: what is shared from beyond an edge of shadow, however little, would
 /// be all that a dark room has.
 pub(crate) fn unless_dark(found: &Found, shared: Vec<Pooled>) -> Vec<Pooled> {
     let own = found.light.iter().zip(&found.noise);
-    let of = |((light, noise), shared): ((&Bands, &f32), Pooled)| match luminance(*light) > 0.0 {
+    let of = |((light, noise), shared): ((&Bands, &f32), Pooled)| match *noise > 0.0 && luminance(*light) > 0.0 {
         true => shared,
         false => Pooled::alone(*light, *noise),
     };
@@ -317,15 +315,15 @@ fn side_of(solution: &Solution, place: &Place) -> Option<Side> {
     (cosine.abs() > FLAT).then_some(if cosine > 0.0 { Side::Front } else { Side::Back })
 }
 
-/// Standard errors of receivers whose halves are `apart` from their mean, lx: each one's own and those of others that are about as
-/// bright count the same.
+/// Standard errors of receivers whose halves are `apart` from their mean, lx, unless that is no number: each one's own and those of
+/// others that are about as bright count the same.
 fn evened(light: &[Bands], apart: &[f32]) -> Vec<f32> {
-    let mut order: Vec<usize> = (0..light.len()).collect();
+    let mut order: Vec<usize> = (0..light.len()).filter(|i| apart[*i].is_finite()).collect();
     order.sort_by(|&i, &j| luminance(light[i]).total_cmp(&luminance(light[j])));
     let square = |i: usize| f64::from(apart[i]).powi(2);
     let mut sums = vec![0.0];
     order.iter().for_each(|&i| sums.push(sums[sums.len() - 1] + square(i)));
-    let mut noise = vec![0.0; light.len()];
+    let mut noise = vec![f32::NAN; light.len()];
     for (rank, &i) in order.iter().enumerate() {
         let (low, high) = (rank.saturating_sub(ALIKE), (rank + ALIKE + 1).min(order.len()));
         let of_alike = (sums[high] - sums[low]) / (high - low) as f64;

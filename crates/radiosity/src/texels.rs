@@ -2,7 +2,7 @@
 //! ([`crate::allocation`]), by what halves differ by after light was shared ([`Atlas::pooled`]); direct light of thinned ones is not. In a furnished office a
 //! twentieth of the texels has two thirds of the squared error, if all have as many rays.
 
-use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth, mean};
+use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, Lit, curb, growth, mean};
 use crate::answer::Station;
 use crate::bake::{Baked, gather_rays};
 use crate::judge::{root_mean_square, thinned as thin};
@@ -99,9 +99,8 @@ pub(crate) fn light(
 
     let first = gather_rays(error).min(FIRST_GATHERED);
     let shadow = rays_for(error, FIRST_SHADOW, LEAST_SHADOW, MOST_SHADOW);
-    let half = |salt| solution.direct_by(&places, &shadowing(shadow / 2), salt, monitor);
-    let halves = half(1)?.into_iter().zip(half(2)?).map(|(a, b)| [a, b]);
-    let mut direct = Found::of_halves(halves, shadow as u32, evened);
+    let half = |at: &[Place], salt| solution.direct_by(at, &shadowing(shadow / 2), salt, monitor);
+    let mut direct = Found::of_lit(half(&places, 1)?, |own| half(&of(own), 2), shadow as u32, evened)?;
     let (mut gathered, mut indirect) = shared(first)?;
     let area = sheet.atlas.areas(sheet.texels);
     let size = root_mean_square(solution);
@@ -124,7 +123,7 @@ pub(crate) fn light(
         curb(&mut times, most_gathered.map(|most| most / first as f64));
         gathered.grow((&times, GATHERED_POWER), |own, rays| {
             let halves = solution.halves_at(&of(own), rays as usize, 1, monitor)?;
-            Ok(halves.into_iter().map(mean).collect())
+            Ok(Lit::sampled(halves.into_iter().map(mean).collect()))
         })?;
         indirect = pooled(gathered);
     }

@@ -6,9 +6,10 @@
 //! pilots of 32 rays made 1.5 % of error where 1.0 % is left without). The visible share is Σ w V/Σ w over directions
 //! drawn nearly in proportion to their cosine, so that w, what is left over, hardly varies: points that see all of a
 //! light get its exact factor, and points near a large one, where area sampling goes wrong by factors, are as good
-//! as far ones.
+//! as far ones. Where little stands before a lamp no rays are sent at all (`eclipse.rs`).
 
-use crate::one_light::{CHANCE, DARK, LIT, luminance_of};
+use crate::eclipse::Sights;
+use crate::one_light::{CHANCE, DARK, LIT, SAMPLED, luminance_of};
 use crate::parts::Parts;
 use crate::{Luminaires, Progress, Receivers, Stopped};
 use radiosity_scene::Bands;
@@ -55,6 +56,7 @@ pub struct Columns {
     seen: Vec<Bands>,
     mean: Vec<Bands>,
     shaded: Vec<bool>,
+    sampled: Vec<bool>,
 }
 
 impl Columns {
@@ -78,6 +80,11 @@ impl Columns {
     pub fn is_shaded(&self, receiver: usize) -> bool {
         self.shaded[receiver]
     }
+
+    /// Whether what they give is known without any chance: what stands before each was cut out of it.
+    pub fn is_exact(&self, receiver: usize) -> bool {
+        !self.sampled[receiver]
+    }
 }
 
 fn add_up(values: &[Bands]) -> Bands {
@@ -99,7 +106,8 @@ struct Spot {
     place: Place,
     /// Where the dealing of its shadow rays begins, in [0, 1).
     offset: f32,
-    /// What became of its shadow rays.
+    /// What became of what was settled without rays, and of its shadow rays.
+    settled: u8,
     outcome: u8,
     /// Whether it lies inside a solid, where that was asked.
     is_buried: Option<bool>,
@@ -110,12 +118,17 @@ struct Scratch<'l> {
     spots: Vec<Spot>,
     /// What could give light to each of them, and room for more.
     parts: Vec<Parts<'l>>,
+    /// What stands before the lights.
+    sights: Sights,
     /// Shadow rays that each light has had at all places of the receiver.
     used: Vec<u32>,
-    /// Result by place and light, lux per band.
+    /// What is known without rays by place and light, lux per band, and all that is found.
+    exact: Vec<[f64; 3]>,
     visible: Vec<[f64; 3]>,
     /// What became of the shadow rays at all places of the receiver.
     outcomes: u8,
+    /// Whether its places tell all there is of it.
+    is_whole: bool,
     /// Rays of a light from which on its visible share is a ratio.
     ratio: u32,
 }
@@ -164,6 +177,7 @@ impl Luminaires {
             columns.seen[i * kept..][..kept].copy_from_slice(&means[..kept]);
             columns.mean[i] = means[kept];
             columns.shaded[i] = true;
+            columns.sampled[i] = true;
         }
         columns
     }
@@ -180,8 +194,13 @@ impl Luminaires {
         let (n, lights) = (receivers.len(), self.lights.len());
         // Points are not looked up by others.
         let kept = if n > 0 && receivers.near(0).is_some() { lights } else { 0 };
-        let mut columns =
-            Columns { lights: kept, seen: vec![[0.0; 3]; n * kept], mean: vec![[0.0; 3]; n], shaded: vec![false; n] };
+        let mut columns = Columns {
+            lights: kept,
+            seen: vec![[0.0; 3]; n * kept],
+            mean: vec![[0.0; 3]; n],
+            shaded: vec![false; n],
+            sampled: vec![false; n],
+        };
         let mut reached = vec![lights == 0; n.div_ceil(CHUNK)];
         if lights == 0 {
             return (columns, reached);
@@ -190,10 +209,11 @@ impl Luminaires {
         let mut seen: Vec<&mut [Bands]> = columns.seen.chunks_mut(CHUNK * kept.max(1)).collect();
         seen.resize_with(n.div_ceil(CHUNK), Default::default);
         let chunks = seen.into_iter().zip(columns.mean.chunks_mut(CHUNK)).zip(columns.shaded.chunks_mut(CHUNK));
+        let chunks = chunks.zip(columns.sampled.chunks_mut(CHUNK));
         let mut chunks: Vec<_> = chunks.zip(&mut reached).enumerate().collect();
         chunks.sort_by_key(|(chunk, _)| key(*chunk));
         // Whoever stops it is not asked again; what is under way is brought to its end.
-        let _ = chunks.into_par_iter().try_for_each(|(chunk, (((seen, mean), shaded), reached))| {
+        let _ = chunks.into_par_iter().try_for_each(|(chunk, ((((seen, mean), shaded), sampled), reached))| {
             let mut scratch = self.scratch(RATIO);
             let mut at: Vec<Place> = Vec::new();
             let mut lit: Vec<[f64; 3]> = Vec::new();
@@ -201,12 +221,13 @@ impl Luminaires {
                 let i = chunk * CHUNK + k;
                 at.clear();
                 lit.clear();
-                self.go_to(receivers, (i, receivers.seed(i)), shadowing.places, &mut scratch);
+                self.go_to((tracer, receivers), (i, receivers.seed(i)), (shadowing, true), &mut scratch);
                 scratch.look(tracer, receivers, (i, 0), shadowing.rays, |_, place, visible| {
                     at.push(*place);
                     lit.extend_from_slice(visible);
                 });
-                shaded[k] = scratch.outcomes & !CHANCE != LIT;
+                shaded[k] = scratch.outcomes & !(CHANCE | SAMPLED) != LIT;
+                sampled[k] = scratch.outcomes & SAMPLED != 0 || !scratch.is_whole;
                 // Where all is lit or all is dark, what is seen from afar has the light of the whole.
                 let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
                 let is_lit = scratch.outcomes & LIT != 0;
@@ -264,13 +285,14 @@ impl Luminaires {
             for (k, out) in out.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
                 let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
-                self.go_to(receivers, (i, hash(receivers.seed(i))), shadowing.places, &mut scratch);
+                self.go_to((tracer, receivers), (i, hash(receivers.seed(i))), (shadowing, false), &mut scratch);
                 for set in 1..3 {
                     scratch.look(tracer, receivers, (i, set), shadowing.rays, |index, _, visible| {
                         let sum = visible.iter().map(|e| luminance_of(*e)).sum::<f64>();
                         at[set as usize - 1][index] = Some(sum);
                     });
-                    if scratch.outcomes == LIT || scratch.outcomes == DARK {
+                    let is_alike = matches!(scratch.outcomes & !SAMPLED, LIT | DARK);
+                    if is_alike || scratch.outcomes & SAMPLED == 0 {
                         // There is no noise to keep apart.
                         at[1] = at[0].clone();
                         break;
@@ -310,28 +332,51 @@ impl Luminaires {
 
     fn scratch(&self, ratio: u32) -> Scratch<'_> {
         let lights = self.lights.len();
-        Scratch { spots: Vec::new(), parts: Vec::new(), used: vec![0; lights], visible: Vec::new(), outcomes: 0, ratio }
+        Scratch {
+            spots: Vec::new(),
+            parts: Vec::new(),
+            sights: Sights::default(),
+            used: vec![0; lights],
+            exact: Vec::new(),
+            visible: Vec::new(),
+            outcomes: 0,
+            is_whole: true,
+            ratio,
+        }
     }
 
-    /// Goes to the places of a receiver that a seed tells, and finds what could give light there.
+    /// Goes to the places of a receiver that a seed tells, finds what could give light there, and settles what it takes no rays for.
     fn go_to<'l>(
         &'l self,
-        receivers: &impl Receivers,
+        (tracer, receivers): (&Tracer, &impl Receivers),
         (i, seed): (usize, u32),
-        wanted: u32,
-        Scratch { spots, parts, .. }: &mut Scratch<'l>,
+        (shadowing, is_mean): (&Shadowing, bool),
+        Scratch { spots, parts, sights, exact, is_whole, .. }: &mut Scratch<'l>,
     ) {
         spots.clear();
+        exact.clear();
+        *is_whole = true;
         let Some(site) = receivers.site(i) else { return };
+        // Where rays would be fewer, as nothing was found to be in the way, there is little to cut.
+        let (rays, count) = (shadowing.rays, receivers.places(i, shadowing.places));
+        sights.go_to(site, self, count);
         let places = Sequence::new(seed, DIRECT);
-        for index in 0..receivers.places(i, wanted) {
+        let thirds = site.thirds().filter(|_| is_mean && sights.are_clear(self, tracer, rays));
+        let count = if thirds.is_some() { 3 } else { count };
+        *is_whole = thirds.is_some() || site.point().is_some();
+        for index in 0..count {
             let [offset, _, x, y] = places.point(index);
-            let place = site.place(x, y);
+            let place = thirds.map_or_else(|| site.place(x, y), |thirds| thirds[index as usize]);
             if parts.len() == spots.len() {
                 parts.push(Parts::default());
             }
-            parts[spots.len()].find(self, &place);
-            spots.push(Spot { place, offset, outcome: 0, is_buried: None });
+            let (own, first) = (&mut parts[spots.len()], exact.len());
+            own.find(self, &place);
+            exact.resize(first + self.lights.len(), [0.0; 3]);
+            let settled = own.settle(self, rays, &mut exact[first..], |light, panel, k, rays| {
+                sights.share((light, panel, k), tracer, &place, rays)
+            });
+            spots.push(Spot { place, offset, settled, outcome: 0, is_buried: None });
         }
     }
 }
@@ -352,8 +397,7 @@ impl Scratch<'_> {
         let lights = self.used.len();
         self.used.fill(0);
         self.outcomes = 0;
-        self.visible.clear();
-        self.visible.resize(self.spots.len() * lights, [0.0; 3]);
+        self.visible.clone_from(&self.exact);
         for index in 0..self.spots.len() {
             if self.spots[index].is_buried == Some(true) {
                 continue;
@@ -388,16 +432,15 @@ impl Scratch<'_> {
 
     /// Adds what each light gives at a place, by its number, to `visible`; what became of the shadow rays.
     fn shadow(&mut self, tracer: &Tracer, index: usize, rays: u32, (offset, seed): (f64, u32)) -> u8 {
-        // Deal the rays out: part l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average. Half of them go by what the parts
-        // would give and half to all alike, as a lamp that had a ray now and then would sparkle in sunlight.
+        // Deal the rays out: part l gets ⌊n_l⌋ or ⌈n_l⌉ of them, and n_l on average.
         let Scratch { spots, parts, used, visible, ratio, .. } = self;
         let (place, parts) = (&spots[index].place, &parts[index]);
         let visible = &mut visible[index * used.len()..][..used.len()];
-        let even = 0.5 * f64::from(rays) / parts.len() as f64;
-        let (mut reached, mut outcomes) = (offset, 0);
+        let (mut reached, mut outcomes) = (offset, spots[index].settled);
         for (number, part) in parts.iter().enumerate() {
             let l = part.light;
-            let expected = 0.5 * f64::from(rays) * part.weight / parts.total() + even;
+            outcomes |= SAMPLED;
+            let expected = parts.expected(part, rays);
             let before = reached.floor();
             reached += expected;
             let n = (reached.floor() - before) as u32;
@@ -437,174 +480,4 @@ fn openness(tracer: &Tracer, places: &[Place], near: f64, seed: u32) -> Vec<f64>
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::PointReceivers;
-    use crate::polygon::point_to_triangle;
-    use glam::DVec3;
-    use radiosity_scene::{Elements, Material, Mesh, Scene};
-    use std::f64::consts::PI;
-
-    /// A floor, and lamps of 0.2 m side in a row 2 m above it that face down, each half as bright as the one before.
-    fn lamps(count: u32, blocker: bool) -> Scene {
-        let mut scene = Scene::default();
-        let lamp = |l: f32| Material { emissive: [l; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
-        scene.materials.push(Material::default());
-        scene.materials.push(Material { double_sided: true, ..Material::default() });
-        scene.materials.extend((0..count).map(|i| lamp(1000.0 * 0.5f32.powi(i as i32))));
-        let quad = |low: DVec3, x: DVec3, y: DVec3| [low, low + x, low + x + y, low + y];
-        scene.add_quad("floor", 0, quad(DVec3::new(-3., -3., 0.), DVec3::X * 6.0, DVec3::Y * 6.0));
-        for i in 0..count {
-            let low = DVec3::new(0.3 * f64::from(i), 0.0, 2.0);
-            scene.add_quad("lamp", 2 + i as usize, quad(low, DVec3::Y * 0.2, DVec3::X * 0.2));
-        }
-        if blocker {
-            // Half way up: hides what lies beyond x = 0.1 from a point below that.
-            scene.add_quad("blocker", 1, quad(DVec3::new(0.1, -1.0, 1.0), DVec3::X * 2.0, DVec3::Y * 2.0));
-        }
-        scene
-    }
-
-    fn prepared(scene: &Scene) -> (Mesh, Luminaires) {
-        let mesh = Mesh::new(scene);
-        let elements = Elements::new(scene, &mesh, 10.0);
-        let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
-        let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(scene, &mesh, e).1).collect();
-        let luminaires = Luminaires::new(scene, &mesh, &elements, &area, &exitance);
-        (mesh, luminaires)
-    }
-
-    fn illuminance(scene: &Scene, places: &[Place], rays: u32) -> Vec<f64> {
-        let (mesh, luminaires) = prepared(scene);
-        let tracer = Tracer::new(scene, &mesh);
-        let receivers = PointReceivers { places, shaded: &[], salt: 0 };
-        let columns = luminaires.columns(&tracer, &receivers, &Shadowing { places: 1, rays }, &()).unwrap();
-        (0..places.len()).map(|i| f64::from(columns.mean(i)[1])).collect()
-    }
-
-    fn on_the_floor(x: f64, y: f64) -> Place {
-        Place { point: DVec3::new(x, y, 0.0), normal: DVec3::Z, triangle: u32::MAX }
-    }
-
-    /// What a lamp of luminance 1000 gives to a point of the floor, by Lambert's factor of the part from `from` to `to`.
-    fn exact(place: &Place, (from, to): (f64, f64)) -> f64 {
-        let p = |x: f64, y: f64| DVec3::new(x, y, 2.0);
-        let corners = [p(from, 0.0), p(from, 0.2), p(to, 0.2), p(to, 0.0)];
-        let factor = point_to_triangle(place.point, place.normal, [corners[0], corners[1], corners[2]])
-            + point_to_triangle(place.point, place.normal, [corners[0], corners[2], corners[3]]);
-        1000.0 * PI * factor
-    }
-
-    /// In full light every lamp gives its exact factor, in whatever shares the rays are dealt out.
-    #[test]
-    fn full_light_is_exact() {
-        let places: Vec<Place> = (0..20).map(|i| on_the_floor(0.1 * f64::from(i) - 0.7, 0.05)).collect();
-        for (place, e) in places.iter().zip(illuminance(&lamps(6, false), &places, 64)) {
-            let truth: f64 = (0..6)
-                .map(|i| {
-                    let shifted = on_the_floor(place.point.x - 0.3 * f64::from(i), place.point.y);
-                    0.5f64.powi(i) * exact(&shifted, (0.0, 0.2))
-                })
-                .sum();
-            assert!((e - truth).abs() < 1e-5 * truth, "{e} for {truth}");
-        }
-    }
-
-    /// What is reached before time is over has the light that it has without a limit, to the bit; the rest has the mean of it.
-    #[test]
-    fn what_time_does_not_reach_has_the_mean() {
-        struct After(usize);
-        impl Progress for After {
-            fn step(&self, done: usize, _total: usize) -> bool {
-                done < self.0
-            }
-        }
-        let scene = lamps(1, true);
-        let mesh = Mesh::new(&scene);
-        let elements = Elements::new(&scene, &mesh, 0.1);
-        let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
-        let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(&scene, &mesh, e).1).collect();
-        let luminaires = Luminaires::new(&scene, &mesh, &elements, &area, &exitance);
-        let (tracer, exposure) = (Tracer::new(&scene, &mesh), crate::Exposure::default());
-        let receivers = crate::ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
-        let shadowing = Shadowing { places: 2, rays: 2 };
-        let whole = luminaires.columns(&tracer, &receivers, &shadowing, &()).unwrap();
-        let n = elements.len();
-        assert!(luminaires.columns(&tracer, &receivers, &shadowing, &After(n / 2)).is_err());
-        for after in [0, n / 2, n + 1] {
-            let found = luminaires.columns_in_time(&tracer, &receivers, &shadowing, &area, &After(after));
-            let is_same = |i: &usize| found.mean(*i) == whole.mean(*i) && found.seen(*i) == whole.seen(*i);
-            let (same, other): (Vec<usize>, Vec<usize>) = (0..n).partition(is_same);
-            // A little more than asked for: what is under way is brought to its end, on as many threads as there are.
-            assert!(same.len() >= after.min(n) && (after > n || other.len() > n / 4), "{} of {n}", same.len());
-            for band in 0..3 {
-                let of = |i: &usize| area[*i] * f64::from(found.mean(*i)[band]);
-                let mean = same.iter().map(of).sum::<f64>() / same.iter().map(|i| area[*i]).sum::<f64>();
-                let is_mean = |i: &usize| (f64::from(found.mean(*i)[band]) - mean).abs() < 1e-2 * mean;
-                assert!(other.iter().all(is_mean), "{mean}");
-            }
-        }
-    }
-
-    /// Few rays scatter about the truth and are not drawn to it from one side, in shadow, light and between; pilots that
-    /// stopped early were.
-    #[test]
-    fn penumbrae_are_unbiased() {
-        let scene = lamps(1, true);
-        for x in [-0.02, 0.002, 0.02, 0.07, 0.098] {
-            // From (x, 0) the blocker's edge at (0.1, 1) is seen against the lamp's plane at 0.2 − x.
-            let edge = (0.2f64 - x).clamp(0.0, 0.2);
-            let truth = exact(&on_the_floor(x, 0.1), (0.0, edge));
-            // Places a hair apart have independent rays.
-            let places: Vec<Place> = (0..4000).map(|i| on_the_floor(x, 0.1 + 1e-7 * f64::from(i))).collect();
-            for rays in [2, 8] {
-                let e = illuminance(&scene, &places, rays);
-                let mean = e.iter().sum::<f64>() / e.len() as f64;
-                let spread = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / e.len() as f64).sqrt();
-                let error = spread / (e.len() as f64).sqrt();
-                // Five standard errors: a false alarm once in two million.
-                assert!((mean - truth).abs() < 5.0 * error + 2e-3 * truth, "{x}, {rays}: {mean} for {truth} ± {error}");
-            }
-        }
-    }
-
-    /// Of four hundred lamps the near ones are found and the far ones not forgotten: few rays scatter about the truth, and by
-    /// little; so does the single one of a gather.
-    #[test]
-    fn many_lamps_are_unbiased() {
-        let mut scene = Scene::default();
-        let lamp = Material { emissive: [1000.0; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
-        scene.materials = vec![Material::default(), lamp];
-        let quad = |low: DVec3, x: DVec3, y: DVec3| [low, low + x, low + x + y, low + y];
-        scene.add_quad("floor", 0, quad(DVec3::ZERO, DVec3::X * 40.0, DVec3::Y * 40.0));
-        let low = |i: u32, j: u32| DVec3::new(2.0 * f64::from(i) + 0.9, 2.0 * f64::from(j) + 0.9, 2.0);
-        for (i, j) in (0..20).flat_map(|i| (0..20).map(move |j| (i, j))) {
-            scene.add_quad("lamp", 1, quad(low(i, j), DVec3::Y * 0.2, DVec3::X * 0.2));
-        }
-        let (mesh, luminaires) = prepared(&scene);
-        let tracer = Tracer::new(&scene, &mesh);
-        for [x, y] in [[21.0, 21.0], [20.0, 7.0], [0.1, 39.0]] {
-            let at = on_the_floor(x, y);
-            let of_lamp = |i: u32, j: u32| {
-                let [a, b, c, d] = quad(low(i, j), DVec3::Y * 0.2, DVec3::X * 0.2);
-                let factor = |corners| point_to_triangle(at.point, at.normal, corners);
-                1000.0 * PI * (factor([a, b, c]) + factor([a, c, d]))
-            };
-            let truth: f64 = (0..20).flat_map(|i| (0..20).map(move |j| (i, j))).map(|(i, j)| of_lamp(i, j)).sum();
-            let places: Vec<Place> = (0..2000).map(|k| on_the_floor(x, y + 1e-7 * f64::from(k))).collect();
-            let e = illuminance(&scene, &places, 64);
-            let mean = e.iter().sum::<f64>() / e.len() as f64;
-            let spread = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / e.len() as f64).sqrt();
-            let error = spread / (e.len() as f64).sqrt();
-            // Five standard errors: a false alarm once in two million.
-            assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
-            assert!(spread < 0.15 * truth, "({x}, {y}): {spread} about {truth}");
-            let mut parts = Parts::default();
-            let mut single = |seed: u32| luminaires.sample(0, &tracer, &at, hash(seed), &mut parts)[1];
-            let single: Vec<f64> = (0..4000).map(&mut single).collect();
-            let mean = single.iter().sum::<f64>() / 4000.0;
-            let error = (single.iter().map(|e| (e - mean).powi(2)).sum::<f64>()).sqrt() / 4000.0;
-            assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
-        }
-    }
-}
+mod tests;

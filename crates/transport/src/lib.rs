@@ -7,6 +7,7 @@
 
 mod block;
 pub mod direct;
+mod eclipse;
 pub mod exposure;
 pub mod form_factors;
 pub mod gather;

@@ -4,8 +4,10 @@
 use crate::polygon::Four;
 use glam::DVec3;
 use radiosity_scene::{AlphaMode, Bands, Elements, Mesh, PointLight, Scene, Side, luminance};
-use radiosity_trace::{Emitter, EmitterTree};
+use radiosity_trace::{Emitter, EmitterTree, quadrilateral};
 use rayon::prelude::*;
+use smallvec::SmallVec;
+use std::ops::Range;
 
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
 /// nothing extra: its noise there is no more than that of ordinary reflected light.
@@ -30,9 +32,53 @@ pub struct Piece {
     pub varied: bool,
 }
 
+/// A convex part of a lamp that is evenly bright: a triangle, or two that make a quadrilateral.
+#[derive(Clone, Debug)]
+pub(crate) struct Panel {
+    /// Corners, counter-clockwise seen from the emitting side.
+    pub corners: SmallVec<[DVec3; 4]>,
+    /// Two axes along it and the third against its normal, right-handed.
+    pub axes: [DVec3; 3],
+    /// Its triangles, by their number among those of the light.
+    pub pieces: Range<usize>,
+}
+
+impl Panel {
+    /// Those of a light, one for each piece or two that follow each other.
+    fn of(pieces: &[Piece]) -> Vec<Panel> {
+        let mut panels: Vec<Panel> = Vec::new();
+        for (k, piece) in pieces.iter().enumerate() {
+            let joined = panels.last().and_then(|last| {
+                let first = &pieces[last.pieces.start];
+                let is_like = last.pieces.len() == 1 && first.exitance == piece.exitance;
+                (is_like && first.normal.dot(piece.normal) > FLAT)
+                    .then(|| quadrilateral(first.corners, piece.corners))
+                    .flatten()
+            });
+            match (joined, panels.last_mut()) {
+                (Some(corners), Some(last)) => {
+                    (last.corners, last.pieces.end) = (SmallVec::from_slice(&corners), k + 1)
+                }
+                _ => {
+                    let x = (piece.corners[1] - piece.corners[0]).normalize_or_zero();
+                    let axes = [x, x.cross(piece.normal), -piece.normal];
+                    panels.push(Panel { corners: SmallVec::from_slice(&piece.corners), axes, pieces: k..k + 1 });
+                }
+            }
+        }
+        panels
+    }
+}
+
+/// Cosine of what lies in one plane, at least.
+const FLAT: f64 = 1.0 - 1e-12;
+
 /// Lights with more triangles than this have them in a tree: to evaluate the polygon factor of each would cost more
 /// than the shadow rays.
 pub(crate) const MOST_EXACT_PIECES: usize = 64;
+
+/// Lights of more panels than this are looked at by rays alone: a place would look for blockers as often.
+const MOST_PANELS: usize = 8;
 
 /// More objects that emit than this are one light: what each gives to each element would fill the memory, and to
 /// look at all of them from every place would take longer than the rays.
@@ -81,6 +127,8 @@ pub struct Luminaires {
     pub lights: Vec<Light>,
     /// The triangles of all lights without a tree, one after the other: lamps of two triangles would leave half of the lanes empty.
     pub(crate) few: Vec<Four>,
+    /// By light, its panels, if all of them are evenly bright and there are few.
+    pub(crate) panels: Vec<Vec<Panel>>,
     /// Exitance of each element (bands) that is counted through `lights` and must not be counted by rows as well.
     pub promoted: Vec<[f32; 4]>,
     /// Triangles by side whose whole emission is carried by `lights`.
@@ -152,7 +200,13 @@ impl Luminaires {
         }
         lights.extend(scene.lights.iter().cloned().map(Light::Point));
         let few: Vec<[DVec3; 3]> = lights.iter().flat_map(Light::few).map(|piece| piece.corners).collect();
-        Luminaires { lights, few: few.chunks(4).map(Four::new).collect(), promoted, carried }
+        let panels = lights.iter().map(|light| {
+            let pieces = light.few();
+            let panels = if pieces.iter().any(|piece| piece.varied) { Vec::new() } else { Panel::of(pieces) };
+            if panels.len() > MOST_PANELS { Vec::new() } else { panels }
+        });
+        let panels = panels.collect();
+        Luminaires { lights, few: few.chunks(4).map(Four::new).collect(), panels, promoted, carried }
     }
 
     /// Lights that a scene has at most, told by its objects alone.

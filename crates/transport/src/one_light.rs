@@ -17,6 +17,8 @@ pub const LIT: u8 = 1;
 pub const DARK: u8 = 2;
 /// What was found would be noisy even if all shadow rays had come through.
 pub const CHANCE: u8 = 4;
+/// It was asked by shadow rays: others might find something else.
+pub const SAMPLED: u8 = 8;
 
 /// Luminance of a sum that is kept in double precision.
 pub fn luminance_of(e: [f64; 3]) -> f64 {

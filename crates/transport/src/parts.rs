@@ -1,8 +1,8 @@
 //! What has shadow rays of its own at a place: a light, or of one with many triangles groups of them.
 
 use crate::Luminaires;
-use crate::luminaires::{Light, Piece};
-use crate::one_light::{Samples, from_few, from_many, from_point, luminance_of, unshadowed};
+use crate::luminaires::{Light, Panel, Piece};
+use crate::one_light::{DARK, LIT, Samples, from_few, from_many, from_point, luminance_of, unshadowed};
 use crate::polygon::Four;
 use radiosity_scene::{PointLight, luminance};
 use radiosity_trace::{EmitterTree, Place, Tracer};
@@ -28,10 +28,22 @@ enum What<'l> {
     Many(&'l [Piece], &'l [Four], &'l EmitterTree, u32),
 }
 
+/// A place that sees less than this share of a lamp is asked whether it is buried, as one is of whose rays none came through: beneath a
+/// lid with a gap of a tenth of a millimetre some light comes in.
+const GLIMPSE: f64 = 1.0 / 64.0;
+
+/// How many of so many rays one of some parts, of a weight among all, is to have: half of them go by what the parts would give and half to all
+/// alike, as a lamp that had a ray now and then would sparkle in sunlight.
+fn expected((count, total): (usize, f64), weight: f64, rays: u32) -> f64 {
+    0.5 * f64::from(rays) * (weight / total + 1.0 / count as f64)
+}
+
 /// The parts of lights at one place, and the room to find them.
 #[derive(Default)]
 pub struct Parts<'l> {
     list: Vec<Part<'l>>,
+    /// How many there were, and the sum of their weights, before any was settled.
+    count: usize,
     total: f64,
     /// What each triangle gives of those for which that is known, luminance-weighted.
     factors: Vec<f64>,
@@ -67,7 +79,7 @@ impl<'l> Parts<'l> {
     fn clear(&mut self) {
         self.list.clear();
         self.factors.clear();
-        self.total = 0.0;
+        (self.count, self.total) = (0, 0.0);
     }
 
     fn add(&mut self, number: usize, light: &'l Light, place: &Place) {
@@ -113,6 +125,7 @@ impl<'l> Parts<'l> {
     fn push(&mut self, light: usize, weight: f64, what: What<'l>) {
         if weight > 0.0 {
             self.total += weight;
+            self.count += 1;
             self.list.push(Part { light, weight, what });
         }
     }
@@ -122,14 +135,14 @@ impl<'l> Parts<'l> {
         self.list.len()
     }
 
+    /// How many of so many rays a part is to have on average; those of what is settled are saved.
+    pub fn expected(&self, part: &Part, rays: u32) -> f64 {
+        expected((self.count, self.total), part.weight, rays)
+    }
+
     /// All of them.
     pub fn iter(&self) -> impl Iterator<Item = &Part<'l>> {
         self.list.iter()
-    }
-
-    /// The sum of their weights.
-    pub fn total(&self) -> f64 {
-        self.total
     }
 
     /// One of them by its weight, with a number in [0, 1), and how probable that was.
@@ -140,6 +153,50 @@ impl<'l> Parts<'l> {
             rest < 0.0
         });
         picked.or(self.list.last()).map(|part| (part, part.weight / self.total))
+    }
+
+    /// Takes out of the parts what panels give whose visible `share` is known: it is asked by light, panel, and how many of so many
+    /// `rays` the panel would have, and what they give is added to `e` by light. Answers what became of it.
+    pub fn settle(
+        &mut self,
+        luminaires: &Luminaires,
+        rays: u32,
+        e: &mut [[f64; 3]],
+        mut share: impl FnMut(usize, &Panel, usize, f64) -> Option<f64>,
+    ) -> u8 {
+        let Parts { list, factors, count, total, .. } = self;
+        let expected = |weight: f64| expected((*count, *total), weight, rays);
+        let mut outcome = 0;
+        list.retain_mut(|part| {
+            let What::Few(pieces, first, here) = &mut part.what else { return true };
+            let panels = &luminaires.panels[part.light];
+            let (mut is_left, mut is_settled) = (panels.is_empty(), false);
+            for (k, panel) in panels.iter().enumerate() {
+                let own = &mut factors[*first..][panel.pieces.clone()];
+                let factor: f64 = own.iter().sum();
+                if factor <= 0.0 {
+                    continue;
+                }
+                let Some(visible) = share(part.light, panel, k, expected(part.weight) * factor / part.weight) else {
+                    is_left = true;
+                    continue;
+                };
+                own.fill(0.0);
+                is_settled = true;
+                let exitance = pieces[panel.pieces.start].exitance;
+                let whole = factor / f64::from(luminance(exitance));
+                for (band, exitance) in exitance.into_iter().enumerate() {
+                    here[band] -= whole * f64::from(exitance);
+                    e[part.light][band] += visible * whole * f64::from(exitance);
+                }
+                outcome |= if visible > GLIMPSE { LIT } else { 0 } | if visible < 1.0 { DARK } else { 0 };
+            }
+            if is_left && is_settled {
+                part.weight = factors[*first..][..pieces.len()].iter().sum();
+            }
+            is_left
+        });
+        outcome
     }
 
     /// Irradiance of the place from one of the parts, by some samples, and what became of their rays. From `ratio` samples on

@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Elements, Mesh};
 use radiosity_trace::{Place, Tracer};
+use smallvec::SmallVec;
 
 /// Places keep off the border of their element by about this many welding tolerances (millionths of the scene).
 const BORDER: f64 = 4.0;
@@ -64,6 +65,24 @@ impl Site {
     pub fn point(&self) -> Option<Place> {
         let Site { origin, normal, triangle, .. } = *self;
         (self.edges == [DVec3::ZERO; 2]).then_some(Place { point: origin, normal, triangle })
+    }
+
+    /// The corners of the triangle that its places lie on, or its only place; none where it has normals of its own all over.
+    pub(crate) fn outline(&self) -> Option<SmallVec<[DVec3; 3]>> {
+        let Site { origin, edges: [along, across], .. } = *self;
+        if self.point().is_some() {
+            return Some(SmallVec::from_slice(&[origin]));
+        }
+        self.normals.is_none().then(|| SmallVec::from_slice(&[origin, origin + along, origin + across]))
+    }
+
+    /// Places over which what is smooth has the mean that it has over the site, to the second degree; none where parts of it are
+    /// not exposed.
+    pub(crate) fn thirds(&self) -> Option<[Place; 3]> {
+        let Site { origin, edges: [along, across], normal, triangle, mask, .. } = *self;
+        let is_whole = mask == u64::MAX && self.normals.is_none() && self.point().is_none();
+        let at = |(u, v): (f64, f64)| Place { point: origin + u * along + v * across, normal, triangle };
+        is_whole.then(|| [(1.0 / 6.0, 1.0 / 6.0), (2.0 / 3.0, 1.0 / 6.0), (1.0 / 6.0, 2.0 / 3.0)].map(at))
     }
 
     /// The place that (x, y) in the unit square maps to.

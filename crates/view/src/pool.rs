@@ -168,9 +168,10 @@ impl Grid<'_> {
             }
         }
 
+        // What has no noise says nothing of that of the others.
         let variance = Sums::new(self, |i| {
-            let w = self.weight(i);
-            [1.0, w, w * f64::from(self.samples[i].noise).powi(2)]
+            let (w, variance) = (self.weight(i), f64::from(self.samples[i].noise).powi(2));
+            if variance > 0.0 { [1.0, w, w * variance] } else { [0.0; 3] }
         });
         // Places without a plane have no say in it.
         let evened = Sums::new(self, |i| if best[i].0 == NOWHERE { [0.0; 2] } else { [1.0, best[i].0 as f64] });
@@ -185,7 +186,7 @@ impl Grid<'_> {
             let (low, high, share) = (near(at.floor())?, near(at.ceil())?, at.fract());
             let [count, weight, sum] = variance.within(self, i, COMPARED);
             // Of so many places a variance is known to √(2/n) of itself: less than twice that beyond the noise is chance.
-            let noise = sum / weight * (1.0 + (8.0 / count).sqrt());
+            let noise = if count > 0.5 { sum / weight * (1.0 + (8.0 / count).sqrt()) } else { 0.0 };
             let kept = if missed > 0.0 { (1.0 - noise / missed).clamp(0.0, 1.0) } else { 0.0 };
             let between = |low: f64, high: f64| low + share * (high - low);
             let own = self.values(i);
@@ -198,7 +199,7 @@ impl Grid<'_> {
             // leverage of least squares); beside it the place keeps a part of its own, which h counts already.
             let h = between(low.share, high.share);
             let part = kept * kept + (1.0 - kept * kept) * h;
-            let spread = (sum.max(0.0) / count / self.weight(i) * part).sqrt();
+            let spread = (sum.max(0.0) / count.max(1.0) / self.weight(i) * part).sqrt();
             Some(Pooled { light, own: kept as f32, noise: noise as f32, spread: spread as f32 })
         };
         (0..self.samples.len()).map(light).collect()

@@ -1,0 +1,333 @@
+use super::*;
+use crate::PointReceivers;
+use crate::polygon::point_to_triangle;
+use glam::DVec3;
+use radiosity_scene::{Elements, Material, Mesh, Scene};
+use radiosity_trace::sampling::Random;
+use std::f64::consts::PI;
+
+/// A floor, and lamps of 0.2 m side in a row 2 m above it that face down, each half as bright as the one before.
+fn lamps(count: u32, blocker: bool) -> Scene {
+    let mut scene = Scene::default();
+    let lamp = |l: f32| Material { emissive: [l; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
+    scene.materials.push(Material::default());
+    scene.materials.push(Material { double_sided: true, ..Material::default() });
+    scene.materials.extend((0..count).map(|i| lamp(1000.0 * 0.5f32.powi(i as i32))));
+    let quad = |low: DVec3, x: DVec3, y: DVec3| [low, low + x, low + x + y, low + y];
+    scene.add_quad("floor", 0, quad(DVec3::new(-3., -3., 0.), DVec3::X * 6.0, DVec3::Y * 6.0));
+    for i in 0..count {
+        let low = DVec3::new(0.3 * f64::from(i), 0.0, 2.0);
+        scene.add_quad("lamp", 2 + i as usize, quad(low, DVec3::Y * 0.2, DVec3::X * 0.2));
+    }
+    if blocker {
+        // Half way up: hides what lies beyond x = 0.1 from a point below that.
+        scene.add_quad("blocker", 1, quad(DVec3::new(0.1, -1.0, 1.0), DVec3::X * 2.0, DVec3::Y * 2.0));
+    }
+    scene
+}
+
+fn prepared(scene: &Scene) -> (Mesh, Luminaires) {
+    let mesh = Mesh::new(scene);
+    let elements = Elements::new(scene, &mesh, 10.0);
+    let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+    let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(scene, &mesh, e).1).collect();
+    let luminaires = Luminaires::new(scene, &mesh, &elements, &area, &exitance);
+    (mesh, luminaires)
+}
+
+fn columns(scene: &Scene, places: &[Place], rays: u32) -> Columns {
+    let (mesh, luminaires) = prepared(scene);
+    let tracer = Tracer::new(scene, &mesh);
+    let receivers = PointReceivers { places, shaded: &[], salt: 0 };
+    luminaires.columns(&tracer, &receivers, &Shadowing { places: 1, rays }, &()).unwrap()
+}
+
+fn illuminance(scene: &Scene, places: &[Place], rays: u32) -> Vec<f64> {
+    let columns = columns(scene, places, rays);
+    (0..places.len()).map(|i| f64::from(columns.mean(i)[1])).collect()
+}
+
+fn on_the_floor(x: f64, y: f64) -> Place {
+    Place { point: DVec3::new(x, y, 0.0), normal: DVec3::Z, triangle: u32::MAX }
+}
+
+/// What a lamp of luminance 1000 gives to a point of the floor, by Lambert's factor of the part from `from` to `to`.
+fn exact(place: &Place, (from, to): (f64, f64)) -> f64 {
+    let p = |x: f64, y: f64| DVec3::new(x, y, 2.0);
+    let corners = [p(from, 0.0), p(from, 0.2), p(to, 0.2), p(to, 0.0)];
+    let factor = point_to_triangle(place.point, place.normal, [corners[0], corners[1], corners[2]])
+        + point_to_triangle(place.point, place.normal, [corners[0], corners[2], corners[3]]);
+    1000.0 * PI * factor
+}
+
+/// In full light every lamp gives its exact factor, in whatever shares the rays are dealt out.
+#[test]
+fn full_light_is_exact() {
+    let places: Vec<Place> = (0..20).map(|i| on_the_floor(0.1 * f64::from(i) - 0.7, 0.05)).collect();
+    for (place, e) in places.iter().zip(illuminance(&lamps(6, false), &places, 64)) {
+        let truth: f64 = (0..6)
+            .map(|i| {
+                let shifted = on_the_floor(place.point.x - 0.3 * f64::from(i), place.point.y);
+                0.5f64.powi(i) * exact(&shifted, (0.0, 0.2))
+            })
+            .sum();
+        assert!((e - truth).abs() < 1e-5 * truth, "{e} for {truth}");
+    }
+}
+
+/// What is reached before time is over has the light that it has without a limit, to the bit; the rest has the mean of it.
+#[test]
+fn what_time_does_not_reach_has_the_mean() {
+    struct After(usize);
+    impl Progress for After {
+        fn step(&self, done: usize, _total: usize) -> bool {
+            done < self.0
+        }
+    }
+    let scene = lamps(1, true);
+    let mesh = Mesh::new(&scene);
+    let elements = Elements::new(&scene, &mesh, 0.1);
+    let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+    let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(&scene, &mesh, e).1).collect();
+    let luminaires = Luminaires::new(&scene, &mesh, &elements, &area, &exitance);
+    let (tracer, exposure) = (Tracer::new(&scene, &mesh), crate::Exposure::default());
+    let receivers = crate::ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+    let shadowing = Shadowing { places: 2, rays: 2 };
+    let whole = luminaires.columns(&tracer, &receivers, &shadowing, &()).unwrap();
+    let n = elements.len();
+    assert!(luminaires.columns(&tracer, &receivers, &shadowing, &After(n / 2)).is_err());
+    for after in [0, n / 2, n + 1] {
+        let found = luminaires.columns_in_time(&tracer, &receivers, &shadowing, &area, &After(after));
+        let is_same = |i: &usize| found.mean(*i) == whole.mean(*i) && found.seen(*i) == whole.seen(*i);
+        let (same, other): (Vec<usize>, Vec<usize>) = (0..n).partition(is_same);
+        // A little more than asked for: what is under way is brought to its end, on as many threads as there are.
+        assert!(same.len() >= after.min(n) && (after > n || other.len() > n / 4), "{} of {n}", same.len());
+        for band in 0..3 {
+            let of = |i: &usize| area[*i] * f64::from(found.mean(*i)[band]);
+            let mean = same.iter().map(of).sum::<f64>() / same.iter().map(|i| area[*i]).sum::<f64>();
+            let is_mean = |i: &usize| (f64::from(found.mean(*i)[band]) - mean).abs() < 1e-2 * mean;
+            assert!(other.iter().all(is_mean), "{mean}");
+        }
+    }
+}
+
+/// Few rays scatter about the truth and are not drawn to it from one side, in shadow, light and between; pilots that
+/// stopped early were.
+#[test]
+fn penumbrae_are_unbiased() {
+    let scene = lamps(1, true);
+    for x in [-0.02, 0.002, 0.02, 0.07, 0.098] {
+        // From (x, 0) the blocker's edge at (0.1, 1) is seen against the lamp's plane at 0.2 − x.
+        let edge = (0.2f64 - x).clamp(0.0, 0.2);
+        let truth = exact(&on_the_floor(x, 0.1), (0.0, edge));
+        // Places a hair apart have independent rays.
+        let places: Vec<Place> = (0..4000).map(|i| on_the_floor(x, 0.1 + 1e-7 * f64::from(i))).collect();
+        for rays in [2, 6] {
+            let e = illuminance(&scene, &places, rays);
+            let mean = e.iter().sum::<f64>() / e.len() as f64;
+            let spread = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / e.len() as f64).sqrt();
+            let error = spread / (e.len() as f64).sqrt();
+            // Five standard errors: a false alarm once in two million.
+            assert!((mean - truth).abs() < 5.0 * error + 2e-3 * truth, "{x}, {rays}: {mean} for {truth} ± {error}");
+        }
+    }
+}
+
+/// Where rays would take longer, what stands before a lamp is cut out of it: no noise is left.
+#[test]
+fn penumbrae_past_few_blockers_are_exact() {
+    let scene = lamps(1, true);
+    let places: Vec<Place> = (0..60).map(|i| on_the_floor(0.0053 * f64::from(i) - 0.1, 0.1)).collect();
+    let columns = columns(&scene, &places, 16);
+    for (i, place) in places.iter().enumerate() {
+        let truth = exact(place, (0.0, (0.2 - place.point.x).clamp(0.0, 0.2)));
+        let e = f64::from(columns.mean(i)[1]);
+        assert!(columns.is_exact(i) && (e - truth).abs() < 1e-5 * exact(place, (0.0, 0.2)), "{e} for {truth}");
+        assert!(e > 0.0 || place.point.x > 0.2 - 1e-9);
+    }
+}
+
+/// Whatever stands in the way, and on whatever side of whose planes: cuts and rays agree.
+#[test]
+fn cuts_are_as_rays_see_it() {
+    let mut random = Random::new(6);
+    for trial in 0..12 {
+        let mut scene = lamps(2, false);
+        let mut vector = || DVec3::from_array(std::array::from_fn(|_| random.next_unit() - 0.5));
+        for _ in 0..8 {
+            let low = DVec3::new(0.2, 0.1, 1.3) + vector() * DVec3::new(1.0, 1.0, 1.8);
+            let (x, y) = (0.4 * vector(), 0.4 * vector());
+            scene.add_quad("blocker", 1, [low, low + x, low + x + y, low + y]);
+        }
+        let places: Vec<Place> = (0..8)
+            .map(|_| on_the_floor(0.2, 0.1))
+            .map(|at| Place { point: at.point + vector() * DVec3::new(2.0, 2.0, 0.0), ..at })
+            .collect();
+        let told = columns(&scene, &places, 64);
+        // Few rays at places a hair apart.
+        let near: Vec<Place> = places
+            .iter()
+            .flat_map(|at| (0..4000).map(|k| Place { point: at.point + 1e-8 * f64::from(k) * DVec3::X, ..*at }))
+            .collect();
+        let asked = illuminance(&scene, &near, 6);
+        for (i, asked) in asked.chunks(4000).enumerate() {
+            let mean = asked.iter().sum::<f64>() / 4000.0;
+            let error = asked.iter().map(|e| (e - mean).powi(2)).sum::<f64>().sqrt() / 4000.0;
+            let e = f64::from(told.mean(i)[1]);
+            assert!(told.is_exact(i), "{trial} {i}");
+            assert!((e - mean).abs() <= 5.0 * error + 1e-4 * mean, "{trial} {i}: {e}, by rays {mean} ± {error}");
+        }
+    }
+}
+
+/// A lamp behind a wall of triangles that share their edges, in whatever direction: no light at all, and places there may be asked
+/// whether they are buried.
+#[test]
+fn nothing_shines_through_between_triangles() {
+    let mut random = Random::new(2);
+    let mut unit = || random.next_unit();
+    for _ in 0..20 {
+        let mut scene = lamps(1, false);
+        let turn = glam::DQuat::from_rotation_z(6.0 * unit()) * glam::DQuat::from_rotation_x(0.6 * unit() - 0.3);
+        let knots: Vec<Vec<DVec3>> = (0..6)
+            .map(|i| {
+                let knot = |k: i32| {
+                    let at =
+                        DVec3::new(f64::from(i) - 2.5 + 0.6 * unit(), f64::from(k) - 2.5 + 0.6 * unit(), 0.3 * unit());
+                    DVec3::new(0.1, 0.1, 1.0) + turn * (0.4 * at)
+                };
+                (0..6).map(knot).collect()
+            })
+            .collect();
+        for (i, k) in (0..5).flat_map(|i| (0..5).map(move |k| (i, k))) {
+            scene.add_quad("wall", 1, [knots[i][k], knots[i + 1][k], knots[i + 1][k + 1], knots[i][k + 1]]);
+        }
+        let places: Vec<Place> = (0..50).map(|_| on_the_floor(0.4 * unit() - 0.1, 0.4 * unit() - 0.1)).collect();
+        let columns = columns(&scene, &places, 64);
+        assert!((0..places.len()).all(|i| columns.is_exact(i) && columns.mean(i) == [0.0; 3]));
+    }
+}
+
+/// Light of an element is the same by few places and by many, whether its lamps are settled, asked by rays, or the one and the other.
+#[test]
+fn elements_have_the_mean_over_their_places() {
+    let mut scene = lamps(3, true);
+    // Before the last lamp stands more than is cut.
+    let at = |i: i32, k: i32| DVec3::new(0.6 + 0.03 * f64::from(i), 0.03 * f64::from(k), 1.9);
+    for (i, k) in (0..9).flat_map(|i| (0..9).map(move |k| (i, k))).filter(|(i, k)| (i + k) % 2 == 0) {
+        scene.add_quad("check", 1, [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]);
+    }
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let elements = Elements::new(&scene, &mesh, 0.4);
+    let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+    let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(&scene, &mesh, e).1).collect();
+    let luminaires = Luminaires::new(&scene, &mesh, &elements, &area, &exitance);
+    let exposure = crate::Exposure::default();
+    let receivers = crate::ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+    let floor =
+        elements.cells_of(0, radiosity_scene::Side::Front).chain(elements.cells_of(1, radiosity_scene::Side::Front));
+    let floor: Vec<usize> = floor.flat_map(|cell| elements.of_cell(cell)).map(|e| e as usize).collect();
+    let flux = |places: u32, rays: u32| -> f64 {
+        let columns = luminaires.columns(&tracer, &receivers, &Shadowing { places, rays }, &()).unwrap();
+        floor.iter().map(|&e| area[e] * f64::from(columns.mean(e)[1])).sum()
+    };
+    let truth = flux(256, 16);
+    for (places, rays) in [(8, 1), (8, 2), (8, 3), (8, 6), (8, 16), (16, 64)] {
+        let found = flux(places, rays);
+        assert!((found / truth - 1.0).abs() < 0.01, "{places} places, {rays} rays: {found} for {truth}");
+    }
+}
+
+/// Far from lamps that nothing stands before, three places tell the mean over an element, and near them they are not trusted.
+#[test]
+fn few_places_tell_the_mean_far_from_lamps_alone() {
+    let mut scene = lamps(1, false);
+    scene.add_quad("plate", 0, [[0.1, 0.0, 1.7], [0.4, 0.0, 1.7], [0.4, 0.3, 1.7], [0.1, 0.3, 1.7]].map(DVec3::from));
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let elements = Elements::new(&scene, &mesh, 0.3);
+    let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+    let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(&scene, &mesh, e).1).collect();
+    let luminaires = Luminaires::new(&scene, &mesh, &elements, &area, &exitance);
+    let exposure = crate::Exposure::default();
+    let receivers = crate::ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+    let columns = luminaires.columns(&tracer, &receivers, &Shadowing { places: 8, rays: 2 }, &()).unwrap();
+    let mut told = [0; 2];
+    for e in 0..elements.len() as u32 {
+        let (triangle, _) = elements.place(e);
+        let is_near = triangle >= 4;
+        if is_near && mesh.normal(triangle).z > 0.9 {
+            assert!(!columns.is_exact(e as usize));
+            told[0] += 1;
+        } else if triangle < 2 && columns.is_exact(e as usize) && columns.mean(e as usize)[1] > 0.0 {
+            let at = |k: u32| {
+                let uv = elements.sample(e, (f64::from(k % 40) + 0.5) / 40.0, (f64::from(k / 40) + 0.5) / 40.0);
+                exact(&Place { point: mesh.point(triangle, uv), normal: DVec3::Z, triangle: u32::MAX }, (0.0, 0.2))
+            };
+            let (mean, found) = ((0..1600).map(at).sum::<f64>() / 1600.0, f64::from(columns.mean(e as usize)[1]));
+            assert!((found - mean).abs() < 1e-3 * mean, "{e}: {found} for {mean}");
+            told[1] += 1;
+        }
+    }
+    assert!(told[0] >= 2 && told[1] > 100, "{told:?}");
+}
+
+/// A normal that is not the triangle's: what lies below the triangle is hidden by it.
+#[test]
+fn triangles_hide_what_lies_below_them() {
+    let scene = lamps(1, false);
+    let mesh = Mesh::new(&scene);
+    let tilted = |x: f64| DVec3::new(x, 0.0, 1.0).normalize();
+    // From before the lamp it is above the floor whatever the normal; on a wall of the lamp's own height half of it is not.
+    for (x, far) in [(0.3, 0.5), (-0.8, 2.0)] {
+        let place = Place { normal: tilted(x), triangle: 0, ..on_the_floor(far, 0.1) };
+        assert_eq!(mesh.normal(0), DVec3::Z);
+        let told = columns(&scene, &[place], 64);
+        let p = |x: f64, y: f64| DVec3::new(x, y, 2.0);
+        let corners = [p(0.0, 0.0), p(0.0, 0.2), p(0.2, 0.2), p(0.2, 0.0)];
+        let truth = 1000.0 * PI * crate::polygon::point_to_polygon(place.point, place.normal, &corners);
+        let e = f64::from(told.mean(0)[1]);
+        assert!((e - truth).abs() < 1e-5 * truth, "{e} for {truth}");
+    }
+}
+
+/// Of four hundred lamps the near ones are found and the far ones not forgotten: few rays scatter about the truth, and by
+/// little; so does the single one of a gather.
+#[test]
+fn many_lamps_are_unbiased() {
+    let mut scene = Scene::default();
+    let lamp = Material { emissive: [1000.0; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
+    scene.materials = vec![Material::default(), lamp];
+    let quad = |low: DVec3, x: DVec3, y: DVec3| [low, low + x, low + x + y, low + y];
+    scene.add_quad("floor", 0, quad(DVec3::ZERO, DVec3::X * 40.0, DVec3::Y * 40.0));
+    let low = |i: u32, j: u32| DVec3::new(2.0 * f64::from(i) + 0.9, 2.0 * f64::from(j) + 0.9, 2.0);
+    for (i, j) in (0..20).flat_map(|i| (0..20).map(move |j| (i, j))) {
+        scene.add_quad("lamp", 1, quad(low(i, j), DVec3::Y * 0.2, DVec3::X * 0.2));
+    }
+    let (mesh, luminaires) = prepared(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    for [x, y] in [[21.0, 21.0], [20.0, 7.0], [0.1, 39.0]] {
+        let at = on_the_floor(x, y);
+        let of_lamp = |i: u32, j: u32| {
+            let [a, b, c, d] = quad(low(i, j), DVec3::Y * 0.2, DVec3::X * 0.2);
+            let factor = |corners| point_to_triangle(at.point, at.normal, corners);
+            1000.0 * PI * (factor([a, b, c]) + factor([a, c, d]))
+        };
+        let truth: f64 = (0..20).flat_map(|i| (0..20).map(move |j| (i, j))).map(|(i, j)| of_lamp(i, j)).sum();
+        let places: Vec<Place> = (0..2000).map(|k| on_the_floor(x, y + 1e-7 * f64::from(k))).collect();
+        let e = illuminance(&scene, &places, 64);
+        let mean = e.iter().sum::<f64>() / e.len() as f64;
+        let spread = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / e.len() as f64).sqrt();
+        let error = spread / (e.len() as f64).sqrt();
+        // Five standard errors: a false alarm once in two million.
+        assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
+        assert!(spread < 0.15 * truth, "({x}, {y}): {spread} about {truth}");
+        let mut parts = Parts::default();
+        let mut single = |seed: u32| luminaires.sample(0, &tracer, &at, hash(seed), &mut parts)[1];
+        let single: Vec<f64> = (0..4000).map(&mut single).collect();
+        let mean = single.iter().sum::<f64>() / 4000.0;
+        let error = (single.iter().map(|e| (e - mean).powi(2)).sum::<f64>()).sqrt() / 4000.0;
+        assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
+    }
+}
