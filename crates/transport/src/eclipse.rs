@@ -370,8 +370,8 @@ fn halves(heights: &[f64; MOST_CORNERS], reach: f64, polygon: &Polygon) -> Halve
     let mut halves = Halves { below: Polygon::NONE, above: Polygon::NONE };
     let last = polygon.len - 1;
     let (mut x, mut y, mut h) = (polygon.x[last], polygon.y[last], heights[last]);
-    for k in 0..polygon.len {
-        let (to_x, to_y, height) = (polygon.x[k], polygon.y[k], heights[k]);
+    for (k, &height) in heights.iter().enumerate().take(polygon.len) {
+        let (to_x, to_y) = (polygon.x[k], polygon.y[k]);
         if (h > reach && height < -reach) || (h < -reach && height > reach) {
             let t = h / (h - height);
             let (x, y) = (x + t * (to_x - x), y + t * (to_y - y));
