@@ -36,8 +36,16 @@ const FOLLOWED: f64 = 0.5;
 /// Share of light samples that ignore what the element itself received, so that no light is ever missed.
 const UNGUIDED: f64 = 0.2;
 
+/// Where the lights are of at most so many times four triangles, one is picked by what it would give at the very spot. In a furnished office of
+/// twelve lamps, each an object, by what elements received of each with their few rays, the noise of 512 rays was 1.77 instead of 1.00 %.
+const MOST_FOURS: usize = 16;
+
 /// The stream of sample points that gathers use.
 const GATHER: u32 = 0x0200;
+
+/// Those of paths from near hits, for either half of the rays, and of the light there.
+const PATHS: u32 = 0x0210;
+const LIGHT: u32 = 0x0220;
 
 /// A solution, as a gather reads it.
 pub struct Gather<'a> {
@@ -86,14 +94,19 @@ impl<'a> Gather<'a> {
                 let (sequence, salt) = (Sequence::new(seed, GATHER), hash(seed));
                 let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
                 volley.aim(&sequence, 2 * half_rays);
-                let Volley { points, directions, order, light } = &mut volley;
+                let Volley { points, directions, order, light, near } = &mut volley;
                 for &index in &*order {
                     let above = only.unwrap_or_else(|| {
                         let [_, _, x, y] = sequence.point(index);
                         Hemisphere::new(self.tracer, &site.place(x, y))
                     });
                     let ray = above.ray(directions[index as usize]);
-                    light[index as usize] = caster.arriving(&ray, hash(salt ^ index), &mut parts);
+                    let (known, spot) = caster.end(&ray, hash(salt ^ index));
+                    light[index as usize] = known.map(f64::from);
+                    near[usize::from(index >= half_rays)].extend(spot.map(|spot| (index, spot)));
+                }
+                for (half, near) in (0..).zip(near) {
+                    caster.follow(near, light, (seed, half, salt), &mut parts);
                 }
                 pilot.place(k, &site, 2 * half_rays);
                 for (index, (point, light)) in points.iter().zip(light).enumerate() {
@@ -134,6 +147,8 @@ struct Volley {
     directions: Vec<[f32; 3]>,
     order: Vec<u32>,
     light: Vec<[f64; 3]>,
+    /// By halves, those that met what is near.
+    near: [Vec<(u32, Spot)>; 2],
 }
 
 impl Volley {
@@ -161,6 +176,7 @@ impl Volley {
             *next += 1;
         }
         self.light.resize(rays as usize, [0.0; 3]);
+        self.near.iter_mut().for_each(Vec::clear);
     }
 }
 
@@ -198,11 +214,22 @@ impl Hemisphere {
 }
 
 /// Where on a surface a ray ended.
+#[derive(Clone, Copy)]
 struct Spot {
     triangle: usize,
     uv: [f32; 2],
     side: Side,
     id: u32,
+}
+
+/// Whether a path goes on from what is near.
+fn is_followed(seed: u32) -> bool {
+    f64::from(unit(hash(seed ^ 0x6))) < FOLLOWED
+}
+
+/// Where it goes, and which light is looked at.
+fn draw(seed: u32) -> [f32; 3] {
+    [0x1, 0x2, 0x3].map(|k| unit(hash(seed ^ k)))
 }
 
 /// A gather under way.
@@ -217,12 +244,35 @@ impl<'a> Caster<'_, 'a> {
     #[inline]
     fn arriving(&self, ray: &Ray, seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
         match self.end(ray, seed) {
-            (light, None) => light.map(f64::from),
-            (light, Some(spot)) => self.followed(light, spot, seed, parts),
+            (light, Some(spot)) if is_followed(seed) => self.followed(light, spot, (draw(seed), seed), parts),
+            (light, _) => light.map(f64::from),
         }
     }
 
-    /// Radiosity of what a ray meets, and the spot from which it goes on.
+    /// Has some of the rays of a half of a receiver go on that met what is near: every other one, by elements, as paths whose
+    /// directions and lights are points of a sequence in that order. So those from one element go all over its hemisphere (array-RQMC;
+    /// L'Ecuyer, Lécot and Tuffin 2008). Of 512 rays the noise is 0.59 instead of 0.64 % in the Cornell box, and 1.00 instead of 1.11 % in a
+    /// furnished office.
+    fn follow(
+        &self,
+        near: &mut [(u32, Spot)],
+        light: &mut [[f64; 3]],
+        (seed, half, salt): (u32, u32, u32),
+        parts: &mut Parts<'a>,
+    ) {
+        near.sort_unstable_by_key(|(index, spot)| (spot.id, *index));
+        let sequence = Sequence::new(seed, PATHS + half);
+        let offset = f64::from(sequence.point(0)[3]);
+        let before = |k: usize| (FOLLOWED * k as f64 + offset) as u32;
+        let followed = near.iter().enumerate().filter(|(k, _)| before(*k) < before(k + 1));
+        for (number, (_, (index, spot))) in (0..).zip(followed) {
+            let [u, v, pick, _] = sequence.point(number);
+            let light = &mut light[*index as usize];
+            *light = self.followed(light.map(|l| l as f32), *spot, ([u, v, pick], hash(salt ^ index)), parts);
+        }
+    }
+
+    /// Radiosity of what a ray meets, and the spot if that is near.
     #[inline]
     fn end(&self, ray: &Ray, seed: u32) -> (Bands, Option<Spot>) {
         let Gather { tracer, ids, .. } = self.gather;
@@ -231,16 +281,21 @@ impl<'a> Caster<'_, 'a> {
         let [r, g, b, near] = self.looked_up[id as usize];
         let spot = match found {
             Found::Surface { triangle, uv, side, distance } if distance < near => {
-                let is_followed = f64::from(unit(hash(seed ^ 0x6))) < FOLLOWED;
-                is_followed.then_some(Spot { triangle: triangle as usize, uv, side, id })
+                Some(Spot { triangle: triangle as usize, uv, side, id })
             }
             _ => None,
         };
         ([r, g, b], spot)
     }
 
-    /// The same along a ray that met `light` and goes on as a path from the very spot.
-    fn followed(&self, light: Bands, spot: Spot, mut seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
+    /// The same along a ray that met `light` and goes on as a path from the very spot, first to a direction and by a light that are `drawn`.
+    fn followed(
+        &self,
+        light: Bands,
+        spot: Spot,
+        (mut drawn, mut seed): ([f32; 3], u32),
+        parts: &mut Parts<'a>,
+    ) -> [f64; 3] {
         let gather = self.gather;
         let (scene, mesh) = (gather.tracer.scene, gather.tracer.mesh);
         let (mut sum, mut throughput) = ([0f64; 3], [1f64; 3]);
@@ -271,10 +326,12 @@ impl<'a> Caster<'_, 'a> {
                 return sum;
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
-            let direct = gather.one_light(&place, element as usize, seed, parts);
+            let [u, v, pick] = drawn;
+            let direct = gather.direct(&place, element as usize, (pick, seed), parts);
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
-            let point = [hash(seed ^ 0x1), hash(seed ^ 0x2)].map(unit);
-            end = self.end(&Hemisphere::new(gather.tracer, &place).towards(point), seed);
+            let (light, spot) = self.end(&Hemisphere::new(gather.tracer, &place).towards([u, v]), seed);
+            end = (light, spot.filter(|_| is_followed(seed)));
+            drawn = draw(seed);
         }
         sum
     }
@@ -302,15 +359,23 @@ impl<'a> Gather<'a> {
         opposite
     }
 
-    /// Direct irradiance at a spot of an element: what the element received, and by how much one light differs from that at
-    /// the spot, picked after what it gave the element. Where light is even, that is next to nothing.
-    fn one_light(&self, spot: &Place, element: usize, seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
-        let lights = self.luminaires.lights.len();
-        if lights == 0 {
-            return [0.0; 3];
+    /// Direct irradiance at a spot of an element by one shadow ray, to a light that `pick` stands for.
+    fn direct(&self, spot: &Place, element: usize, (pick, seed): (f32, u32), parts: &mut Parts<'a>) -> [f64; 3] {
+        if self.luminaires.few.len() > MOST_FOURS {
+            return self.one_light(spot, element, (pick, seed), parts);
         }
+        parts.find(self.luminaires, spot);
+        let Some((part, probability)) = parts.pick(pick) else { return [0.0; 3] };
+        let samples = (&Sequence::new(seed, LIGHT), 0, 1);
+        let (e, _) = parts.irradiance(part, self.tracer, spot, samples, (u32::MAX, seed));
+        e.map(|e| e / probability)
+    }
+
+    /// The same: what the element received, and by how much one light differs from that at
+    /// the spot, picked after what it gave the element. Where light is even, that is next to nothing.
+    fn one_light(&self, spot: &Place, element: usize, (pick, seed): (f32, u32), parts: &mut Parts<'a>) -> [f64; 3] {
         let received = self.columns.seen_by_light(element);
-        let (pick, probability) = pick_light(received, f64::from(unit(hash(seed ^ 0x3))));
+        let (pick, probability) = pick_light(received, f64::from(pick));
         let here = self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4), parts);
         let mut direct = [0f64; 3];
         received.iter().for_each(|e| (0..3).for_each(|band| direct[band] += f64::from(e[band])));
