@@ -26,7 +26,7 @@ pub(crate) fn near(area: f64) -> f64 {
     NEAR * (2.0 * area).sqrt()
 }
 
-/// Bounces after which even near elements are looked up. Two millimetres beneath a rug a fiftieth of the light around is found where there is none, and with 4
+/// Bounces after which even near elements are looked up. Two millimetres beneath a rug a sixtieth of the light around is found where there is none, and with 4
 /// a fortieth, which takes as long; with 8 no less.
 const DEEPEST: u32 = 6;
 
@@ -37,9 +37,9 @@ const FOLLOWED: f64 = 0.5;
 /// Share of light samples that ignore what the element itself received, so that no light is ever missed.
 const UNGUIDED: f64 = 0.2;
 
-/// Where the lights are of at most so many times four triangles, one is picked by what it would give at the very spot. In a furnished office of
+/// Where no more than this has to be looked at for it, one of all lights is picked by what it would give at the very spot. In a furnished office of
 /// twelve lamps, each an object, by what elements received of each with their few rays, the noise of 512 rays was 1.77 instead of 1.00 %.
-const MOST_FOURS: usize = 16;
+const MOST_LOOKS: usize = 16;
 
 /// The stream of sample points that gathers use.
 const GATHER: u32 = 0x0200;
@@ -79,7 +79,8 @@ impl<'a> Gather<'a> {
         let n = receivers.len();
         let half_rays = rays.div_ceil(2).max(1) as u32;
         let peak = self.values.iter().map(|[r, g, b, _]| luminance([*r, *g, *b])).fold(0.0, f32::max).into();
-        let caster = Caster { gather: self, looked_up: self.looked_up() };
+        let caster =
+            Caster { gather: self, looked_up: self.looked_up(), sees_all: self.luminaires.looks() <= MOST_LOOKS };
         let done = AtomicUsize::new(0);
         let mut means = vec![[[0f32; 3]; 2]; n];
         means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
@@ -238,6 +239,8 @@ struct Caster<'g, 'a> {
     gather: &'g Gather<'a>,
     /// [`Gather::looked_up`]: all that most rays ask for lies in one place.
     looked_up: Vec<[f32; 4]>,
+    /// Whether a spot looks at all lights before it picks one.
+    sees_all: bool,
 }
 
 impl<'a> Caster<'_, 'a> {
@@ -328,7 +331,10 @@ impl<'a> Caster<'_, 'a> {
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
             let [u, v, pick] = drawn;
-            let direct = gather.direct(&place, element as usize, (pick, seed), parts);
+            let direct = match self.sees_all {
+                true => gather.one_of_all(&place, (pick, seed), parts),
+                false => gather.one_light(&place, element as usize, (pick, seed), parts),
+            };
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
             let (light, spot) = self.end(&Hemisphere::new(gather.tracer, &place).towards([u, v]), seed);
             end = (light, spot.filter(|_| is_followed(seed)));
@@ -360,23 +366,20 @@ impl<'a> Gather<'a> {
         opposite
     }
 
-    /// Direct irradiance at a spot of an element by one shadow ray, to a light that `pick` stands for.
-    fn direct(&self, spot: &Place, element: usize, (pick, seed): (f32, u32), parts: &mut Parts<'a>) -> [f64; 3] {
-        if self.luminaires.few.len() > MOST_FOURS {
-            return self.one_light(spot, element, (pick, seed), parts);
-        }
+    /// Direct irradiance at a spot by one shadow ray, to a light picked by what it would give there with a number in [0, 1).
+    fn one_of_all(&self, spot: &Place, (u, seed): (f32, u32), parts: &mut Parts<'a>) -> [f64; 3] {
         parts.find(self.luminaires, spot);
-        let Some((part, probability)) = parts.pick(pick) else { return [0.0; 3] };
+        let Some((part, probability)) = parts.pick(u) else { return [0.0; 3] };
         let samples = (&Sequence::new(seed, LIGHT), 0, 1);
         let (e, _) = parts.irradiance(part, self.tracer, spot, samples, (u32::MAX, seed));
         e.map(|e| e / probability)
     }
 
-    /// The same: what the element received, and by how much one light differs from that at
+    /// Direct irradiance at a spot of an element: what the element received, and by how much one light differs from that at
     /// the spot, picked after what it gave the element. Where light is even, that is next to nothing.
-    fn one_light(&self, spot: &Place, element: usize, (pick, seed): (f32, u32), parts: &mut Parts<'a>) -> [f64; 3] {
+    fn one_light(&self, spot: &Place, element: usize, (u, seed): (f32, u32), parts: &mut Parts<'a>) -> [f64; 3] {
         let received = self.columns.seen_by_light(element);
-        let (pick, probability) = pick_light(received, f64::from(pick));
+        let (pick, probability) = pick_light(received, f64::from(u));
         let here = self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4), parts);
         let mut direct = [0f64; 3];
         received.iter().for_each(|e| (0..3).for_each(|band| direct[band] += f64::from(e[band])));

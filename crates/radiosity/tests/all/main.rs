@@ -13,6 +13,7 @@ mod full;
 mod furnace;
 #[path = "../common/furnished.rs"]
 mod furnished;
+mod gathers;
 mod lamps;
 mod layers;
 mod live;
