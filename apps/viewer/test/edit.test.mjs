@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { compared, difference, decoded, done, folder, handleOf, luxOf, NEAR, offline, online, picture, pixels, pixelsOf, rendered, restored, saved, SMALL, state, view } from './program.mjs';
+import { compared, difference, decoded, done, folder, handleOf, luxOf, NEAR, offline, online, pause, picture, pixels, pixelsOf, rendered, restored, saved, SMALL, state, view } from './program.mjs';
 import { shown } from './display.mjs';
 import { studio } from './studio.mjs';
 
@@ -78,7 +78,7 @@ test('a thing is dragged, and light follows while it is and as a batch solve has
   const there = await handleOf(page);
   await page.keyboard.press('Control+z');
   await page.waitForFunction((id) => window.radiosity.state().objects.find((object) => object.id === id).matrix[12] === 0, block.id);
-  await page.waitForTimeout(200);
+  await pause(page, 200);
   const back = await page.evaluate(() => window.radiosity.app.gizmo.where().map((x) => x));
   const spot = await page.evaluate(() => window.radiosity.app.spot().toArray());
   back.forEach((value, k) => assert.ok(Math.abs(value - spot[k]) < 1e-6, `${back} ${spot}`));
@@ -110,7 +110,7 @@ test('a key that is held is one gesture: light follows while it is, and it is un
   for (let i = 0; i < 5; i += 1) await page.keyboard.down('d');
   await page.keyboard.up('d');
   await page.keyboard.up('Control');
-  await page.waitForTimeout(300);
+  await pause(page, 300);
   await done(page);
   assert.equal((await state(page)).objects.filter(({ name, deleted }) => name === 'short block' && !deleted).length, 10);
   await page.keyboard.press('Control+z');
@@ -365,7 +365,7 @@ test('what is dimmed looks darker, its error is told, and lamps that were turned
     await done(page);
     // Eyes take a while.
     for (let last = null; ;) {
-      await page.waitForTimeout(1000);
+      await pause(page, 1000);
       const now = (await state(page)).exposure;
       if (now === last) return now;
       last = now;
@@ -523,7 +523,7 @@ test('lamps without area, sheets and colours at vertices', () => inStudio(async 
   // A lamp is dragged: what the server says meanwhile of earlier places does not pull it back.
   const bulb = (await state(page)).lights.find(({ name }) => name === 'bulb');
   await page.evaluate((id) => window.radiosity.app.selectLight(id), bulb.id);
-  await page.waitForTimeout(200);
+  await pause(page, 200);
   await page.evaluate((id) => {
     window.seen = [];
     const look = () => {
@@ -535,7 +535,7 @@ test('lamps without area, sheets and colours at vertices', () => inStudio(async 
   const [x, y] = await grab(page);
   for (let step = 1; step <= 25; step += 1) await page.mouse.move(x + 4 * step, y);
   await page.mouse.up();
-  await page.waitForTimeout(500);
+  await pause(page, 500);
   await done(page, 1);
   const seen = await page.evaluate(() => window.seen);
   assert.ok(seen.at(-1) > bulb.position[0] + 0.1, `${seen.at(-1)}`);

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { done, picture, pixels, restored, state } from './program.mjs';
+import { done, pause, picture, pixels, restored, state } from './program.mjs';
 
 const { program, pages } = await started();
 
@@ -11,10 +11,10 @@ test('everything is reached by keyboard alone', async () => {
   await done(page);
   const { camera, status } = await state(page);
   await page.keyboard.down('w');
-  await page.waitForTimeout(400);
+  await pause(page, 400);
   await page.keyboard.up('w');
   await page.keyboard.down('ArrowRight');
-  await page.waitForTimeout(200);
+  await pause(page, 200);
   await page.keyboard.up('ArrowRight');
   assert.notDeepEqual((await state(page)).camera, camera, 'walks and turns');
 
@@ -150,7 +150,7 @@ test('groups, menus and lists are as keyboards expect them, and keys of one lett
   const letters = async () => {
     const { camera } = await state(page);
     await page.keyboard.down('w');
-    await page.waitForTimeout(250);
+    await pause(page, 250);
     await page.keyboard.up('w');
     await page.keyboard.press('l');
     return JSON.stringify((await state(page)).camera) !== JSON.stringify(camera) || (await state(page)).layer !== 'total';

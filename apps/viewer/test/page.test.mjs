@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { curves, shown } from './display.mjs';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, picture, pixels, pixelsOf, restored, SMALL, state, stuck, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, pause, picture, pixels, pixelsOf, restored, SMALL, state, stuck, view } from './program.mjs';
 import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
@@ -168,7 +168,7 @@ test('points of a grid beneath things are left out and counted', async () => {
     return shift;
   });
   await done(page, edits + 3);
-  await page.waitForTimeout(300);
+  await pause(page, 300);
   const over = await page.evaluate(() => window.radiosity.app.measuring.grid.points.map(({ point: { x, z }, isCovered }) => [x, z, isCovered]));
   const moved = blocks[0].map(([x, z]) => [x + shift[0], z + shift[1]]);
   for (const [x, z, isCovered] of over) {
@@ -306,7 +306,7 @@ test('what is laid is shown in the panel by itself, and its numbers do not lie b
     document.querySelector('.panel').scrollTop = 0;
   });
   await page.keyboard.press('g');
-  await page.waitForTimeout(300);
+  await pause(page, 300);
   assert.equal(await isSeen('#grid .facts'), true);
   // Who scrolls away stays there while the numbers follow.
   await page.evaluate(() => {
@@ -316,32 +316,34 @@ test('what is laid is shown in the panel by itself, and its numbers do not lie b
   assert.equal(await isSeen('#grid .facts'), false);
 
   // From above, part of the grid is seen in the corner where the scale is.
-  const behind = () => page.evaluate(() => {
-    const { app } = window.radiosity;
-    app.showFalseColours(true);
-    const { camera } = app.stage;
-    const [a, b] = app.measuring.grid.points.map(({ point }) => point);
-    const span = a.distanceTo(b);
-    camera.position.copy(app.measuring.grid.points[0].point);
-    camera.position.y += 8 * span;
-    camera.lookAt(app.measuring.grid.points[0].point);
-    // Its first point is moved from the middle of the picture into the corner.
-    camera.translateX(0.72 * 8 * span * Math.tan((camera.fov * Math.PI) / 360) * camera.aspect);
-    camera.translateY(0.5 * 8 * span * Math.tan((camera.fov * Math.PI) / 360));
-    camera.updateMatrixWorld();
-    app.stage.change();
-    return new Promise((seen) => {
-      setTimeout(() => {
-        const scale = document.querySelector('#legend').getBoundingClientRect();
-        const boxes = [...document.querySelectorAll('.numbers-over span:not([hidden])')].map((span) => span.getBoundingClientRect());
-        const isOver = (box) => box.right > scale.left && box.left < scale.right && box.bottom > scale.top && box.top < scale.bottom;
-        const page = app.stage.canvas.getBoundingClientRect();
-        const points = app.measuring.grid.points.map(({ point }) => app.stage.project(point)).filter((at) => at).map(({ x, y }) => [x + page.left, y + page.top]);
-        const there = points.filter(([x, y]) => x > scale.left && x < scale.right + 12 && y > scale.top && y < scale.bottom);
-        seen([boxes.filter(isOver).length, boxes.length, there.length]);
-      }, 800);
+  const behind = async () => {
+    await page.evaluate(() => {
+      const { app } = window.radiosity;
+      app.showFalseColours(true);
+      const { camera } = app.stage;
+      const [a, b] = app.measuring.grid.points.map(({ point }) => point);
+      const span = a.distanceTo(b);
+      camera.position.copy(app.measuring.grid.points[0].point);
+      camera.position.y += 8 * span;
+      camera.lookAt(app.measuring.grid.points[0].point);
+      // Its first point is moved from the middle of the picture into the corner.
+      camera.translateX(0.72 * 8 * span * Math.tan((camera.fov * Math.PI) / 360) * camera.aspect);
+      camera.translateY(0.5 * 8 * span * Math.tan((camera.fov * Math.PI) / 360));
+      camera.updateMatrixWorld();
+      app.stage.change();
     });
-  });
+    await pause(page, 800);
+    return page.evaluate(() => {
+      const { app } = window.radiosity;
+      const scale = document.querySelector('#legend').getBoundingClientRect();
+      const boxes = [...document.querySelectorAll('.numbers-over span:not([hidden])')].map((span) => span.getBoundingClientRect());
+      const isOver = (box) => box.right > scale.left && box.left < scale.right && box.bottom > scale.top && box.top < scale.bottom;
+      const page = app.stage.canvas.getBoundingClientRect();
+      const points = app.measuring.grid.points.map(({ point }) => app.stage.project(point)).filter((at) => at).map(({ x, y }) => [x + page.left, y + page.top]);
+      const there = points.filter(([x, y]) => x > scale.left && x < scale.right + 12 && y > scale.top && y < scale.bottom);
+      return [boxes.filter(isOver).length, boxes.length, there.length];
+    });
+  };
   const [over, all, there] = await behind();
   await picture(page, 'grid-scale');
   assert.ok(all > 3 && there > 0, `${over} ${all} ${there}`);
@@ -536,14 +538,14 @@ test('while the scene comes it is not said to have no light, and thousands of li
   });
   assert.deepEqual(said.hidden, [true, false]);
   // Measured: 50 ms, and 9 s where each is counted among all.
-  assert.ok(said.last === 'lamp (20000)' && said.took < 500, JSON.stringify(said));
+  assert.ok(said.last === 'lamp (20000)' && said.took < 3000, JSON.stringify(said));
   await page.context().close();
 });
 
 test('objects that come together are marked once, with what is selected and edges shown', async () => {
   const page = await pages.open(program.url);
   await done(page);
-  const counts = await page.evaluate(async () => {
+  await page.evaluate(() => {
     const { app } = window.radiosity;
     const [object] = app.objects.values();
     app.select(object.id);
@@ -557,9 +559,10 @@ test('objects that come together are marked once, with what is selected and edge
       };
     }
     for (let time = 0; time < 500; time += 1) app.objectsAhead.hear({ ...object });
-    await new Promise((done) => { setTimeout(done, 500); });
-    return counts;
+    window.counts = counts;
   });
+  await pause(page, 500);
+  const counts = await page.evaluate(() => window.counts);
   assert.ok(counts.outline >= 1 && counts.outline < 5 && counts.edges >= 1 && counts.edges < 5, JSON.stringify(counts));
   assert.deepEqual(page.faults, []);
   await page.context().close();
@@ -912,7 +915,7 @@ test('the error of what is in sight is told, and that of each place in percent o
   const told = async () => {
     await page.waitForFunction(() => window.radiosity.state().inSight !== null);
     // It is asked for where the camera rests.
-    await page.waitForTimeout(1000);
+    await pause(page, 1000);
     return (await state(page)).inSight;
   };
   const all = await told();

@@ -144,6 +144,18 @@ export async function restored(page) {
   await done(page);
 }
 
+/** Waits so many milliseconds, and until a few pictures have been drawn: a slow machine does late what it does with each. */
+export const pause = (page, milliseconds) => page.evaluate((milliseconds) => new Promise((done) => {
+  const begin = performance.now();
+  let left = 5;
+  const tick = () => {
+    left -= 1;
+    if (left < 0 && performance.now() - begin >= milliseconds) done();
+    else requestAnimationFrame(tick);
+  };
+  tick();
+}), milliseconds);
+
 /** Waits until nothing has come for a while. */
 async function quiet(page) {
   let last = -1;
@@ -162,7 +174,7 @@ export async function pixels(page) {
   for (let last = -1, now = await drawn(); now !== last; now = await drawn()) {
     if (Date.now() > deadline) throw new Error('the page never rests');
     last = now;
-    await page.waitForTimeout(700);
+    await pause(page, 700);
   }
   return page.locator('canvas').first().screenshot();
 }

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { done, handleOf, picture, pixels, restored, state } from './program.mjs';
+import { done, handleOf, pause, picture, pixels, restored, state } from './program.mjs';
 
 const { program, pages } = await started();
 
@@ -41,7 +41,7 @@ test('a thumb walks by the stick, a finger turns the head, and two fingers come 
   const walked = await camera();
   assert.ok(along(first, walked) > 0.01, `${first.place} ${walked.place}`);
   assert.deepEqual(walked.turn, first.turn);
-  await page.waitForTimeout(300);
+  await pause(page, 300);
   assert.deepEqual((await camera()).place, walked.place, 'lifted, it stands');
   // Down is back.
   await gesture(page, [middle], [[0, 40]], () => page.waitForFunction((place) =>
@@ -130,7 +130,7 @@ test('a narrow screen that is touched', async () => {
   await picture(page, 'narrow-menu');
   await page.keyboard.press('Escape');
   await page.locator('#fold').tap();
-  await page.waitForTimeout(600);
+  await pause(page, 600);
   await picture(page, 'narrow-panel');
   const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
   assert.ok(overflow <= 0, `${overflow}`);

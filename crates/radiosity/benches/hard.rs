@@ -1,6 +1,6 @@
 //! Is the error that is stated honest in hard scenes, and is what was asked kept?
 //!
-//! `cargo bench -p radiosity --bench hard -- [ERROR [SCENE]]`: `measure` in six rooms made in code, in each a dozen times at three
+//! `cargo bench -p radiosity --bench hard -- [ERROR [SCENE [RUNS]]]`: `measure` in six rooms made in code, in each a dozen times at three
 //! hundred other points, by other seeds of the audit. The truth is an audit by yet another seed and with many more paths. What is
 //! printed: how often the true error is within the bound stated (one-sided 95 %), how often it is beyond it for certain (by
 //! the lower bound of the truth), how often what was asked is kept where this is stated, and how far the true error is below
@@ -18,7 +18,7 @@ use std::time::Instant;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Runs in each scene.
+/// Runs in each scene where their number is not given.
 const RUNS: usize = 12;
 
 /// Points of a run.
@@ -177,12 +177,12 @@ struct Run {
     seconds: f64,
 }
 
-fn examine(scene: &Scene, asked: f64) -> Result<(), Failure> {
+fn examine(scene: &Scene, asked: f64, number: usize) -> Result<(), Failure> {
     let mesh = Mesh::new(scene);
     let tracer = Tracer::new(scene, &mesh);
     let coarse = Solution::new(&tracer, &SolveOptions { cells: 2000, rays: 16, ..SolveOptions::default() }, &())?;
     let mut runs = Vec::new();
-    for run in 0..RUNS {
+    for run in 0..number {
         let places: Vec<Place> =
             stations::spread(&coarse, POINTS, 1 + run as u32).iter().map(|station| station.place).collect();
         let points: Vec<_> = places.iter().map(|place| (place.point, place.normal)).collect();
@@ -204,10 +204,10 @@ fn examine(scene: &Scene, asked: f64) -> Result<(), Failure> {
         });
     }
     let count = |is: &dyn Fn(&Run) -> bool| runs.iter().filter(|run| is(run)).count();
-    let mean = |of: &dyn Fn(&Run) -> f64| runs.iter().map(of).sum::<f64>() / RUNS as f64;
+    let mean = |of: &dyn Fn(&Run) -> f64| runs.iter().map(of).sum::<f64>() / number as f64;
     let root = |of: &dyn Fn(&Run) -> f64| 100.0 * mean(&|run| of(run).powi(2)).sqrt();
     println!(
-        "| {} | {:.2} | {:.2} | {:.2} | {:.2} | {} of {RUNS} | {} | {} of {} | {:.1} | {:.1} |",
+        "| {} | {:.2} | {:.2} | {:.2} | {:.2} | {} of {number} | {} | {} of {} | {:.1} | {:.1} |",
         scene.name,
         root(&|run| run.error),
         100.0 * runs.iter().fold(0.0, |most, run| run.error.max(most)),
@@ -226,6 +226,7 @@ fn examine(scene: &Scene, asked: f64) -> Result<(), Failure> {
 fn main() -> Result<(), Failure> {
     let given: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     let asked = given.first().map_or(Ok(ASKED), |text| text.parse())?;
+    let number = given.get(2).map_or(Ok(RUNS), |text| text.parse())?;
     println!("asked: {} %, {POINTS} points a run\n", 100.0 * asked);
     println!(
         "| | error, % | largest | stated | at most | within the bound | beyond for certain | kept where stated | rounds | s |"
@@ -233,7 +234,7 @@ fn main() -> Result<(), Failure> {
     println!("|---|---|---|---|---|---|---|---|---|---|");
     for scene in [door(), shade(), white(), slits(), lamps(), textured()] {
         if given.get(1).is_none_or(|name| scene.name.contains(name.as_str())) {
-            examine(&scene, asked)?;
+            examine(&scene, asked, number)?;
         }
     }
     Ok(())
