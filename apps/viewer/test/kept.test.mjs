@@ -101,7 +101,7 @@ test('a screenshot is the picture that is seen, with all pixels, and each is a f
   }
   assert.ok(files[0].equals(files[1]));
   const { width, height, at } = await decoded(page, files[0]);
-  const size = await page.evaluate(() => ['clientWidth', 'clientHeight'].map((side) => window.radiosity.app.stage.canvas[side]));
+  const size = await page.evaluate(() => ['clientWidth', 'clientHeight'].map((side) => Math.floor(window.radiosity.app.stage.canvas[side] * devicePixelRatio)));
   assert.deepEqual([width, height], size);
   const places = Array.from({ length: 400 }, (_, i) => [((i % 25) + 0.5) / 25, (Math.floor(i / 25) + 0.5) / 16]);
   const seen = (await pixelsOf(page, places)).flatMap((place, i) => (place ? [[place.pixel, at(places[i])]] : []));

@@ -16,6 +16,9 @@ const radiosity = process.env.RADIOSITY ?? join(root, 'target', 'debug', 'radios
 export const pictures = join(root, 'out', 'viewer');
 mkdirSync(pictures, { recursive: true });
 
+/** Pixels drawn for one of the page, along each side: without graphics hardware drawing takes most of the time. Whoever wants to look at the pictures says SHARP=1. */
+const SHARE = process.env.SHARP ? 1 : 0.5;
+
 /** A scene that is done in a second: few elements, few rays. */
 export const SMALL = ['--elements', '6000', '--rays', '64'];
 
@@ -64,7 +67,7 @@ export async function browser() {
   return {
     close: () => own.close(),
     async open(url, { width = 1000, height = 660, touch = false } = {}) {
-      const context = await own.newContext({ viewport: { width, height }, hasTouch: touch, isMobile: touch, acceptDownloads: true });
+      const context = await own.newContext({ viewport: { width, height }, deviceScaleFactor: SHARE, hasTouch: touch, isMobile: touch, acceptDownloads: true });
       if (process.env.PAGE) await context.route(url, instead);
       const page = await context.newPage();
       // A machine that others use is slow.
@@ -221,7 +224,7 @@ export async function rendered(page, exposure) {
   const [eye, target, fov, size] = await page.evaluate(() => {
     const { stage } = window.radiosity.app;
     const { matrix: m, fov } = stage.place('');
-    return [m.slice(12, 15), [0, 1, 2].map((k) => m[12 + k] - m[8 + k]), (180 / Math.PI) * fov, [stage.canvas.clientWidth, stage.canvas.clientHeight]];
+    return [m.slice(12, 15), [0, 1, 2].map((k) => m[12 + k] - m[8 + k]), (180 / Math.PI) * fov, [stage.canvas.clientWidth, stage.canvas.clientHeight].map((side) => Math.floor(side * devicePixelRatio))];
   });
   const options = ['--eye', eye, '--target', target, '--fov', fov, '--size', size.join('x'), '--exposure', exposure, '-o', 'picture.png'].map(String);
   return batch(page, 'render', options, (file) => file('picture.png'));
