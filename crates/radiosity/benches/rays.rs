@@ -33,6 +33,10 @@ const PASSES: usize = 7;
 /// Rays start and end so far from their surfaces, as a part of half the scene's largest extent: as far as those of [`Tracer`](radiosity_trace::Tracer).
 const CLEARANCE: f32 = 1.0 / (1 << 21) as f32;
 
+/// Segments end this part of their length, and so many clearances, before where they go to: as those of the tracer.
+const SHORT: f32 = 1.0 / (1 << 18) as f32;
+const CLEAR: f32 = 3.0;
+
 /// Half the side of the squares that bundles go between, metres.
 const HALF: f32 = 0.025;
 
@@ -105,7 +109,9 @@ impl Points<'_> {
                 for _ in 0..each {
                     let origin = from + self.around(half) * a + self.around(half) * b;
                     let d = to + self.around(half) * e + self.around(half) * f - origin;
-                    rays.push(Ray { origin, direction: d.normalize(), t_max: d.length(), skip: u32::MAX });
+                    let length = d.length();
+                    let t_max = length - SHORT * length - CLEAR * self.clearance;
+                    rays.push(Ray { origin, direction: d / length, t_max, skip: u32::MAX });
                 }
             }
         }

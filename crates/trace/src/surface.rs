@@ -475,6 +475,32 @@ mod tests {
         }
     }
 
+    /// Segments end before what they go to, and yet a tenth of a millimetre before it something hides it in a hall of ten metres.
+    #[test]
+    fn what_lies_just_before_the_far_end_hides_it() {
+        let material = Material { double_sided: true, ..Material::default() };
+        for (before, is_hidden) in [(1e-4, true), (1e-3, true), (4e-6, false), (-1e-4, false)] {
+            let mut scene = Scene { materials: vec![material.clone()], ..Scene::default() };
+            let mut square = |z: f64| {
+                let corners = [[-5., -5., z], [5., -5., z], [5., 5., z], [-5., 5., z]];
+                scene.add_quad("square", 0, corners.map(DVec3::from))
+            };
+            (square(0.0), square(9.0), square(9.0 - before));
+            let mesh = Mesh::new(&scene);
+            let tracer = Tracer::new(&scene, &mesh);
+            for i in 0..1000u32 {
+                let [x, y, u, v] = [1, 2, 3, 4].map(|k| 9.0 * f64::from(unit(hash(i ^ hash(k)))) - 4.5);
+                let from = Place { point: DVec3::new(x, y, 0.0), normal: DVec3::Z, triangle: u32::MAX };
+                let to = Place { point: DVec3::new(u, v, 9.0), normal: -DVec3::Z, triangle: u32::MAX };
+                assert_eq!(
+                    tracer.mutually_visible(&from, &to, i),
+                    !is_hidden,
+                    "{before} m before {to:?}, from {from:?}"
+                );
+            }
+        }
+    }
+
     /// From under a lid on which another plate lies: through both where these touch or sink into each other by less than the reach, and
     /// only where light does not pass.
     #[test]

@@ -59,7 +59,8 @@ pub fn search(scene: &Scene, mesh: &Mesh) -> Overlaps {
     let mut effort = EFFORT.saturating_mul(mesh.triangles.len()).max(1_000_000);
     for plane in planes.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
         let triangles: Vec<usize> = plane.iter().map(|(_, _, t)| *t as usize).collect();
-        if triangles.iter().all(|&t| object(t) == object(triangles[0])) {
+        let objects: Vec<usize> = triangles.iter().map(|&t| object(t)).collect();
+        if objects.iter().all(|&object| object == objects[0]) {
             continue;
         }
         // Two axes across the plane, the boxes of the triangles along them, and cells as wide as the mean box or more.
@@ -83,29 +84,32 @@ pub fn search(scene: &Scene, mesh: &Mesh) -> Overlaps {
         let cell = mean.max(even).max(mesh.tolerance);
 
         let mut grid: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
-        for (&t, [low, high]) in triangles.iter().zip(&boxes) {
+        for (i, [low, high]) in boxes.iter().enumerate() {
             let at = |corner: &[f64; 2], axis: usize| (corner[axis] / cell).floor() as i64;
             for x in at(low, 0)..=at(high, 0) {
                 for y in at(low, 1)..=at(high, 1) {
                     let others = grid.entry([x, y]).or_default();
-                    for &s in others.iter() {
+                    for &j in others.iter() {
                         let Some(left) = effort.checked_sub(1) else {
                             return summed(scene, mesh, &lies_on, &covered, true);
                         };
                         effort = left;
-                        if object(s) == object(t) || !overlap(mesh, s, t) {
+                        let meet = (0..2).all(|axis| low[axis] <= boxes[j][1][axis] && boxes[j][0][axis] <= high[axis]);
+                        let (s, t) = (triangles[j], triangles[i]);
+                        if objects[j] == objects[i] || !meet || !overlap(mesh, s, t) {
                             continue;
                         }
                         if mesh.normal(s).dot(mesh.normal(t)) < 0.0 {
                             covered[s] |= holds_middle(mesh, t, s);
                             covered[t] |= holds_middle(mesh, s, t);
                         } else {
-                            let (first, later) = if object(s) < object(t) { (s, t) } else { (t, s) };
+                            let (first, later) =
+                                if objects[j] < objects[i] { (objects[j], t) } else { (objects[i], s) };
                             let known = lies_on[later].unwrap_or(usize::MAX);
-                            lies_on[later] = Some(known.min(object(first)));
+                            lies_on[later] = Some(known.min(first));
                         }
                     }
-                    others.push(t);
+                    others.push(i);
                 }
             }
         }
