@@ -485,7 +485,9 @@ mod tests {
                 let corners = [[-5., -5., z], [5., -5., z], [5., 5., z], [-5., 5., z]];
                 scene.add_quad("square", 0, corners.map(DVec3::from))
             };
-            [0.0, 9.0, 9.0 - before].map(&mut square);
+            for height in [0.0, 9.0, 9.0 - before] {
+                square(height);
+            }
             let mesh = Mesh::new(&scene);
             let tracer = Tracer::new(&scene, &mesh);
             for i in 0..1000u32 {
