@@ -147,7 +147,8 @@ export async function restored(page) {
   await done(page);
 }
 
-/** Waits so many milliseconds, and until a few pictures have been drawn: a slow machine does late what it does with each. */
+/** Waits so many milliseconds, and for five turns of the page: what is told in one is drawn in the next, and shown, and asked anew one or two later, which are
+ *  late on a slow machine. */
 export const pause = (page, milliseconds) => page.evaluate((milliseconds) => new Promise((done) => {
   const begin = performance.now();
   let left = 5;

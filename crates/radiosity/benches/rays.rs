@@ -30,10 +30,10 @@ const PORTION: usize = 1 << 12;
 
 const PASSES: usize = 7;
 
-/// Rays start and end so far from their surfaces, as a part of half the scene's largest extent: as far as those of [`Tracer`](radiosity_trace::Tracer).
+/// Rays start so far from their surfaces, as a part of half the scene's largest extent: as far as those of [`Tracer`](radiosity_trace::Tracer).
 const CLEARANCE: f32 = 1.0 / (1 << 21) as f32;
 
-/// Segments end this part of their length, and so many clearances, before where they go to: as those of the tracer.
+/// Segments end this part of their length, and so many clearances, before where they go to: `SHORT` and `CLEAR` of the tracer.
 const SHORT: f32 = 1.0 / (1 << 18) as f32;
 const CLEAR: f32 = 3.0;
 

@@ -3,7 +3,8 @@
 //! A ray sees the front of every surface, the back of double-sided ones, passes cut-out parts and, with probability
 //! 1 − α, blended ones. The back of a one-sided surface stops the ray and is black: light must not enter a room
 //! through the outside of its walls. Ray origins are moved off their surface by a few units in the last place of the
-//! scene's coordinates, which is all the bias there is.
+//! scene's coordinates, and segments end a few millionths of their length before where they go to ([`SHORT`]), which is all the
+//! bias there is.
 
 use crate::sampling::{hash, unit};
 use crate::shaft::Shaft;
@@ -18,8 +19,8 @@ use std::ops::ControlFlow;
 /// (backs are set back by two offsets).
 const REACH: f64 = 4.0;
 
-/// Segments end this part of their length and so many offsets before the place they go to: as far as boxes are widened (heads of `intersect`), so that
-/// the box of the surface there is not entered. With half of either it mostly is; twice as much gains nothing.
+/// Segments between two places end this part of their length and so many offsets before the further one: about twice what boxes are widened by
+/// (head of `intersect`), so that the box of the surface there is not entered. In a Cornell box half as many again a second are told, of bundles twice as many.
 const SHORT: f64 = 1.0 / (1 << 18) as f64;
 const CLEAR: f64 = 3.0;
 
@@ -378,7 +379,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Whether two places see each other. The far end is moved off its surface like the near one, so that neither
-    /// blocks the ray between them.
+    /// blocks the ray between them, and what lies a few millionths of the way before it does not either.
     #[inline]
     pub fn mutually_visible(&self, from: &Place, to: &Place, seed: u32) -> bool {
         let origin = from.point + self.offset * from.normal;
@@ -475,11 +476,12 @@ mod tests {
         }
     }
 
-    /// Segments end before what they go to, and yet a tenth of a millimetre before it something hides it in a hall of ten metres.
+    /// Segments end before what they go to: in a hall of ten metres what lies two hundredths of a millimetre before it does not hide it, and what lies a tenth
+    /// before it does.
     #[test]
     fn what_lies_just_before_the_far_end_hides_it() {
         let material = Material { double_sided: true, ..Material::default() };
-        for (before, is_hidden) in [(1e-4, true), (1e-3, true), (4e-6, false), (-1e-4, false)] {
+        for (before, is_hidden) in [(1e-4, true), (1e-3, true), (2e-5, false), (-1e-4, false)] {
             let mut scene = Scene { materials: vec![material.clone()], ..Scene::default() };
             let mut square = |z: f64| {
                 let corners = [[-5., -5., z], [5., -5., z], [5., 5., z], [-5., 5., z]];

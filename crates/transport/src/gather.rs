@@ -39,6 +39,7 @@ const UNGUIDED: f64 = 0.2;
 
 /// Where no more than this has to be looked at for it, one of all lights is picked by what it would give at the very spot. In a furnished office of
 /// twelve lamps, each an object, by what elements received of each with their few rays, the noise of 512 rays was 1.77 instead of 1.00 %.
+/// A look is at four triangles; that office takes twelve. A lamp in a tree of its own counts as more than all of these, so that where there is one elements say.
 const MOST_LOOKS: usize = 16;
 
 /// The stream of sample points that gathers use.
