@@ -3,7 +3,7 @@
 //! A ray sees the front of every surface, the back of double-sided ones, passes cut-out parts and, with probability
 //! 1 − α, blended ones. The back of a one-sided surface stops the ray and is black: light must not enter a room
 //! through the outside of its walls. Ray origins are moved off their surface by a few units in the last place of the
-//! scene's coordinates, and segments end a few millionths of their length before where they go to ([`SHORT`]), which is all the
+//! scene's coordinates, and segments end a few millionths of their length before where they go to, which is all the
 //! bias there is.
 
 use crate::sampling::{hash, unit};
