@@ -271,7 +271,7 @@ test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a
 });
 
 test('what is changed before the light is there is in it', async () => {
-  const early = await view('--elements', '60000', '--rays', '256');
+  const early = await view('--elements', '60000', '--rays', '512');
   const page = await pages.open(early.url);
   const block = await named(page, 'short block');
   const { is_done } = await page.evaluate((id) => {

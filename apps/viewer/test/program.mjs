@@ -66,8 +66,8 @@ export async function browser() {
   });
   return {
     close: () => own.close(),
-    async open(url, { width = 1000, height = 660, touch = false } = {}) {
-      const context = await own.newContext({ viewport: { width, height }, deviceScaleFactor: SHARE, hasTouch: touch, isMobile: touch, acceptDownloads: true });
+    async open(url, { width = 1000, height = 660, touch = false, share = SHARE } = {}) {
+      const context = await own.newContext({ viewport: { width, height }, deviceScaleFactor: share, hasTouch: touch, isMobile: touch, acceptDownloads: true });
       if (process.env.PAGE) await context.route(url, instead);
       const page = await context.newPage();
       // A machine that others use is slow.
