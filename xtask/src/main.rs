@@ -24,6 +24,7 @@ Usage: cargo xtask VERB
   viewer                                  build the page of `radiosity view` (needs Node.js)
   viewer --check                          is the page that is committed current?
   viewer --test [NAME]...                 its tests in a browser (needs Chromium)
+  viewer --test-all                       with the slow ones
   help                                    show this text
 
 Lengths are metres, light is in lux and cd/m². Output is GLB, the same bytes every time.

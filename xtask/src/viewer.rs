@@ -36,26 +36,34 @@ pub fn command(arguments: &[&str]) -> Result<String, Fault> {
                 ))),
             }
         }
-        ["--test", names @ ..] => {
-            install(&viewer)?;
-            let browser = browser()?;
-            // The program that its own tests run: nothing is compiled where `cargo test --workspace` has been. Built by itself it
-            // would have fewer features of its dependencies, and all of them would be compiled again.
-            let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-            let mut build = Command::new(cargo);
-            run(build.current_dir(&root).args(["test", "--locked", "--workspace", "--test", "cli", "--no-run"]))?;
-            let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
-            let mut tests = Command::new("node");
-            tests.current_dir(&viewer).args(["--test", "--test-concurrency=1"]);
-            for name in names {
-                tests.args(["--test-name-pattern", name]);
-            }
-            tests.args(tests_in(&viewer)?).env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
-            run(&mut tests)?;
-            Ok("viewer: all tests passed".to_owned())
-        }
-        _ => Err(Fault::Usage("'viewer' takes nothing, '--check', or '--test [NAME]...'".to_owned())),
+        ["--test-all"] => test(&viewer, &[], true),
+        // Whoever names a test wants to see it run.
+        ["--test", names @ ..] => test(&viewer, names, !names.is_empty()),
+        _ => Err(Fault::Usage("'viewer' takes nothing, '--check', '--test [NAME]...', or '--test-all'".to_owned())),
     }
+}
+
+/// Runs the page's tests in a browser: those with one of some names, or all; and with those that are `slow`, or without.
+fn test(viewer: &Path, names: &[&str], slow: bool) -> Result<String, Fault> {
+    install(viewer)?;
+    let browser = browser()?;
+    // The program that its own tests run: nothing is compiled where `cargo test --workspace` has been. Built by itself it
+    // would have fewer features of its dependencies, and all of them would be compiled again.
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut build = Command::new(cargo);
+    run(build.current_dir(crate::root()).args(["test", "--locked", "--workspace", "--test", "cli", "--no-run"]))?;
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| crate::root().join("target"), PathBuf::from);
+    let mut tests = Command::new("node");
+    tests.current_dir(viewer).args(["--test", "--test-concurrency=1"]);
+    if slow {
+        tests.env("SLOW", "1");
+    }
+    for name in names {
+        tests.args(["--test-name-pattern", name]);
+    }
+    tests.args(tests_in(viewer)?).env("RADIOSITY", target.join("debug/radiosity")).env("CHROMIUM", browser);
+    run(&mut tests)?;
+    Ok("viewer: all tests passed".to_owned())
 }
 
 /// The files of tests, each with a program and a browser of its own.

@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { compared, difference, decoded, done, folder, handleOf, luxOf, NEAR, offline, online, pause, picture, pixels, pixelsOf, rendered, restored, saved, SMALL, state, view } from './program.mjs';
+import { compared, decoded, difference, done, folder, handleOf, luxOf, NEAR, offline, online, pause, picture, pixels, pixelsOf, rendered, restored, saved, slow, SMALL, state, view } from './program.mjs';
 import { shown } from './display.mjs';
 import { studio } from './studio.mjs';
 
@@ -88,7 +88,7 @@ test('a thing is dragged, and light follows while it is and as a batch solve has
   await page.context().close();
 });
 
-test('a key that is held is one gesture: light follows while it is, and it is undone at once', async () => {
+test('a key that is held is one gesture: light follows while it is, and it is undone at once', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const { edits } = (await state(page)).status;
@@ -121,7 +121,7 @@ test('a key that is held is one gesture: light follows while it is, and it is un
   await page.context().close();
 });
 
-test('two pages drag a thing each at once, one loses its connection meanwhile, and both have the light of both', async () => {
+test('two pages drag a thing each at once, one loses its connection meanwhile, and both have the light of both', slow, async () => {
   const [one, two] = [await pages.open(program.url), await pages.open(program.url)];
   await Promise.all([done(one), done(two)]);
   const { edits } = (await state(one)).status;
@@ -270,7 +270,7 @@ test('a thing is moved, a wall painted and a lamp dimmed, and light follows as a
   await page.context().close();
 });
 
-test('what is changed before the light is there is in it', async () => {
+test('what is changed before the light is there is in it', slow, async () => {
   const early = await view('--elements', '60000', '--rays', '512');
   const page = await pages.open(early.url);
   const block = await named(page, 'short block');
@@ -359,7 +359,7 @@ test('what is refused is taken back, and a copy is selected', async () => {
   await page.context().close();
 });
 
-test('what is dimmed looks darker, its error is told, and lamps that were turned off together come back as they were', () => inStudio(async (page) => {
+test('what is dimmed looks darker, its error is told, and lamps that were turned off together come back as they were', slow, () => inStudio(async (page) => {
   const levels = async () => (await state(page)).lights.map(({ dimming }) => dimming);
   const exposure = async () => {
     await done(page);
@@ -403,7 +403,7 @@ test('what is dimmed looks darker, its error is told, and lamps that were turned
   assert.deepEqual(await levels(), chosen);
 }));
 
-test('lamps and things keep their order where one was changed and the page, or the saved scene, is opened again', () => inStudio(async (page) => {
+test('lamps and things keep their order where one was changed and the page, or the saved scene, is opened again', slow, () => inStudio(async (page) => {
   const lists = async (page) => {
     // Panels are told with the next picture.
     await page.locator('.light b').nth(1).waitFor();
@@ -500,7 +500,7 @@ test('shadows have sharp edges, also when what casts them was moved', () => inSt
   await picture(page, 'edges');
 }));
 
-test('lamps without area, sheets and colours at vertices', () => inStudio(async (page) => {
+test('lamps without area, sheets and colours at vertices', slow, () => inStudio(async (page) => {
   await page.evaluate(() => window.radiosity.app.exposure.set(-5));
 
   // Each pixel is what reflects there, by the colours of vertices, and what comes through the sheet.
@@ -563,7 +563,7 @@ test('lamps without area, sheets and colours at vertices', () => inStudio(async 
   assert.ok(Math.abs(turned.matrix[5] - Math.cos((10 * Math.PI) / 180)) < 1e-4, `${turned.matrix}`);
 }));
 
-test('a lamp is added, duplicated, deleted and brought back by keyboard and by mouse, and light follows as a batch solve has it', async () => {
+test('a lamp is added, duplicated, deleted and brought back by keyboard and by mouse, and light follows as a batch solve has it', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const there = (id) => page.waitForFunction((id) => window.radiosity.state().lights.some((light) => light.id === id && !light.deleted), id);
@@ -649,7 +649,7 @@ test('a lamp is added, duplicated, deleted and brought back by keyboard and by m
   await page.context().close();
 });
 
-test('a box and a luminous panel are added, get other lengths and lumens, are tilted and undone, and light follows as a batch solve has it', async () => {
+test('a box and a luminous panel are added, get other lengths and lumens, are tilted and undone, and light follows as a batch solve has it', slow, async () => {
   const [page, other] = [await pages.open(program.url), await pages.open(program.url)];
   await done(page);
   let { edits } = (await state(page)).status;
@@ -825,7 +825,7 @@ test('a lamp that is added is clear of walls and in the picture, wherever one st
   await page.context().close();
 });
 
-test('a lamp of the file becomes another kind, brighter and narrower by keyboard, and light follows as a batch solve has it', () => inStudio(async (page) => {
+test('a lamp of the file becomes another kind, brighter and narrower by keyboard, and light follows as a batch solve has it', slow, () => inStudio(async (page) => {
   const before = await luxOf(page, 150);
   const { lights, status: { edits } } = await state(page);
   const named = (name) => lights.find((light) => light.name === name);

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { caughtUp, decoded, done, pixels, pixelsOf, state } from './program.mjs';
+import { caughtUp, decoded, done, pixels, pixelsOf, slow, state } from './program.mjs';
 
 const { program, pages } = await started();
 
@@ -51,7 +51,7 @@ test('a view is kept, gone back to from elsewhere and on another page, and forgo
   }
 });
 
-test('a grid and a working plane are there again when the page is loaded anew', async () => {
+test('a grid and a working plane are there again when the page is loaded anew', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const again = async () => {
@@ -86,7 +86,7 @@ test('a grid and a working plane are there again when the page is loaded anew', 
   await page.context().close();
 });
 
-test('a screenshot is the picture that is seen, with all pixels, and each is a file of its own', async () => {
+test('a screenshot is the picture that is seen, with all pixels, and each is a file of its own', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   await pixels(page);

@@ -2,11 +2,11 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { started } from './fixture.mjs';
-import { done, pause, picture, pixels, restored, state } from './program.mjs';
+import { done, pause, picture, pixels, restored, slow, state } from './program.mjs';
 
 const { program, pages } = await started();
 
-test('everything is reached by keyboard alone', async () => {
+test('everything is reached by keyboard alone', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const { camera, status } = await state(page);

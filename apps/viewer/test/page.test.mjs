@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { curves, shown } from './display.mjs';
 import { started } from './fixture.mjs';
-import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, pause, picture, pixels, pixelsOf, restored, SMALL, state, stuck, view } from './program.mjs';
+import { caughtUp, compared, difference, done, folder, luxOf, measured, NEAR, offline, online, pause, picture, pixels, pixelsOf, restored, slow, SMALL, state, stuck, view } from './program.mjs';
 import { middle, room } from './room.mjs';
 
 const { program, pages } = await started();
@@ -34,7 +34,7 @@ test('opens at once, and light comes that a batch solve agrees with', async () =
   await page.context().close();
 });
 
-test('a page that takes nothing holds back neither the solver nor another page', async () => {
+test('a page that takes nothing holds back neither the solver nor another page', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   /** Milliseconds until all light of a series of changes is on the page. */
@@ -103,7 +103,7 @@ test('a measuring grid stays where it was laid, as fine as the standard asks', a
   await page.context().close();
 });
 
-test('points of a grid beneath things are left out and counted', async () => {
+test('points of a grid beneath things are left out and counted', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const laid = await page.evaluate(() => {
@@ -417,7 +417,7 @@ test('noise is shown in false colours, and the eye stays as it was', async () =>
   await page.context().close();
 });
 
-test('how long it will take is told while light comes', async () => {
+test('how long it will take is told while light comes', slow, async () => {
   const lit = await view('--elements', '20000', '--rays', '1024');
   const page = await pages.open(lit.url);
   const told = await page.evaluate(async () => {

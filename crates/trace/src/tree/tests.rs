@@ -427,45 +427,49 @@ fn cube(n: usize) -> Vec<[Vec3; 3]> {
 
 #[test]
 fn nothing_escapes_from_closed_meshes_through_edges_or_vertices() {
-    let mut random = Random(6);
     let needle = |scale: Vec3| cube(3).into_iter().map(move |t| t.map(|c| c * scale)).collect::<Vec<_>>();
-    let mut escapes = Vec::new();
-    for (name, mesh) in [
+    let meshes = [
         ("icosphere", icosphere(4)),
         ("cube", cube(8)),
         ("spindle", spindle(1000)),
         ("needle", needle(Vec3::new(1e-4, 1.0, 1e-3))),
-    ] {
-        for (scale, offset) in [
-            (1.0, Vec3::ZERO),
-            (1e-12, Vec3::ZERO),
-            (1e6, Vec3::ZERO),
-            (1.0, Vec3::new(100.0, -30.0, 7.0)),
-            (1e4, Vec3::new(1e6, 1e6, -1e6)),
-        ] {
-            let triangles: Vec<_> = mesh.iter().map(|t| t.map(|c| c * scale + offset)).collect();
-            let trees = both(&triangles);
-            for i in 0..20_000 {
-                // From the middle, and from where no axis is special.
-                let origin = offset + if i % 2 == 0 { Vec3::ZERO } else { random.point() * 0.00003 * scale };
-                let mut corners = triangles[random.below(triangles.len())];
-                corners.rotate_left(i / 5 % 3);
-                let [a, b, c] = corners;
-                let target = match i % 5 {
-                    0 | 1 => a,
-                    2 | 3 => a + (b - a) * random.next(),
-                    _ => (a + b + c) / 3.0,
-                };
-                let direction = (target - origin).as_dvec3().normalize().as_vec3();
-                let ray = ray(origin, direction);
-                for tree in &trees {
-                    if tree.closest(&ray).is_none() || !tree.blocked(&ray) {
-                        escapes.push((name, scale, offset, tree.simd));
-                    }
+    ];
+    let moved = [
+        (1.0, Vec3::ZERO),
+        (1e-12, Vec3::ZERO),
+        (1e6, Vec3::ZERO),
+        (1.0, Vec3::new(100.0, -30.0, 7.0)),
+        (1e4, Vec3::new(1e6, 1e6, -1e6)),
+    ];
+    let cases: Vec<_> = meshes.iter().flat_map(|mesh| moved.map(|moved| (mesh, moved))).collect();
+    let escaped = |(case, ((name, mesh), (scale, offset))): (usize, &(&(&str, Vec<[Vec3; 3]>), (f32, Vec3)))| {
+        let (scale, offset) = (*scale, *offset);
+        let mut random = Random(6 + case as u64);
+        let triangles: Vec<_> = mesh.iter().map(|t| t.map(|c| c * scale + offset)).collect();
+        let trees = both(&triangles);
+        let mut escapes = Vec::new();
+        for i in 0..20_000 {
+            // From the middle, and from where no axis is special.
+            let origin = offset + if i % 2 == 0 { Vec3::ZERO } else { random.point() * 0.00003 * scale };
+            let mut corners = triangles[random.below(triangles.len())];
+            corners.rotate_left(i / 5 % 3);
+            let [a, b, c] = corners;
+            let target = match i % 5 {
+                0 | 1 => a,
+                2 | 3 => a + (b - a) * random.next(),
+                _ => (a + b + c) / 3.0,
+            };
+            let direction = (target - origin).as_dvec3().normalize().as_vec3();
+            let ray = ray(origin, direction);
+            for tree in &trees {
+                if tree.closest(&ray).is_none() || !tree.blocked(&ray) {
+                    escapes.push((*name, scale, offset, tree.simd));
                 }
             }
         }
-    }
+        escapes
+    };
+    let escapes: Vec<_> = cases.par_iter().enumerate().flat_map_iter(escaped).collect();
     assert!(escapes.is_empty(), "{} escaped, first {:?}", escapes.len(), escapes[0]);
 }
 
