@@ -403,7 +403,8 @@ fn certify_unless(
             if !open {
                 return Ok(audit);
             }
-            if !auditor.trace(2 * auditor.paths(), |done| monitor.step(done, total)) {
+            let paths = (audit.growth(target) * f64::from(auditor.paths())).ceil() as u32;
+            if !auditor.trace(paths, |done| monitor.step(done, total)) {
                 return Err(Error::Stopped);
             }
         }

@@ -480,4 +480,4 @@ fn openness(tracer: &Tracer, places: &[Place], near: f64, seed: u32) -> Vec<f64>
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -11,6 +11,7 @@ mod eclipse;
 pub mod exposure;
 pub mod form_factors;
 pub mod gather;
+mod glance;
 pub(crate) mod lanes;
 pub mod live;
 pub mod luminaires;

@@ -164,7 +164,7 @@ fn sample_one<'p>(
 }
 
 /// Exitance of a piece at a point of it.
-fn tint(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
+pub fn tint(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
     if piece.varied { emission_at(tracer, piece, point) } else { piece.exitance }
 }
 

@@ -28,18 +28,6 @@ enum What<'l> {
     Many(&'l [Piece], &'l [Four], &'l EmitterTree, u32),
 }
 
-impl Luminaires {
-    /// How much a place looks at to know what could give light to it: triangles by fours, nodes of trees, sources without area.
-    pub(crate) fn looks(&self) -> usize {
-        let others = self.lights.iter().map(|light| match light {
-            Light::Area { tree: None, .. } => 0,
-            Light::Area { tree: Some(_), .. } => GROUPS,
-            Light::Point(_) => 1,
-        });
-        self.few.len() + others.sum::<usize>()
-    }
-}
-
 /// A place that sees less than this share of a lamp is asked whether it is buried, as one is of whose rays none came through: beneath a
 /// lid with a gap of a tenth of a millimetre some light comes in.
 const GLIMPSE: f64 = 1.0 / 64.0;

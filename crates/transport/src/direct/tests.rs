@@ -26,7 +26,8 @@ fn lamps(count: u32, blocker: bool) -> Scene {
     scene
 }
 
-fn prepared(scene: &Scene) -> (Mesh, Luminaires) {
+/// The mesh of a scene, and its lights.
+pub(crate) fn prepared(scene: &Scene) -> (Mesh, Luminaires) {
     let mesh = Mesh::new(scene);
     let elements = Elements::new(scene, &mesh, 10.0);
     let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
