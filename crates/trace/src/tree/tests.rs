@@ -442,8 +442,7 @@ fn nothing_escapes_from_closed_meshes_through_edges_or_vertices() {
         (1e4, Vec3::new(1e6, 1e6, -1e6)),
     ];
     let cases: Vec<_> = meshes.iter().flat_map(|mesh| moved.map(|moved| (mesh, moved))).collect();
-    let escaped = |(case, ((name, mesh), (scale, offset))): (usize, &(&(&str, Vec<[Vec3; 3]>), (f32, Vec3)))| {
-        let (scale, offset) = (*scale, *offset);
+    let escapes = cases.par_iter().enumerate().flat_map_iter(|(case, &((name, mesh), (scale, offset)))| {
         let mut random = Random(6 + case as u64);
         let triangles: Vec<_> = mesh.iter().map(|t| t.map(|c| c * scale + offset)).collect();
         let trees = both(&triangles);
@@ -468,8 +467,8 @@ fn nothing_escapes_from_closed_meshes_through_edges_or_vertices() {
             }
         }
         escapes
-    };
-    let escapes: Vec<_> = cases.par_iter().enumerate().flat_map_iter(escaped).collect();
+    });
+    let escapes: Vec<_> = escapes.collect();
     assert!(escapes.is_empty(), "{} escaped, first {:?}", escapes.len(), escapes[0]);
 }
 
