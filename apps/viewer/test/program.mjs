@@ -19,7 +19,7 @@ mkdirSync(pictures, { recursive: true });
 /** Pixels drawn for one of the page, along each side: without graphics hardware drawing takes most of the time. Whoever wants to look at the pictures says SHARP=1. */
 const SHARE = process.env.SHARP ? 1 : 0.5;
 
-/** Options of tests that take ten seconds and more and look closer at what others look at, too: SLOW=1 runs them. */
+/** Options of tests that take ten seconds and more, most of which look closer at what others look at, too: SLOW=1 runs them. */
 export const slow = { skip: process.env.SLOW ? false : 'slow; `cargo xtask viewer --test-all` runs it' };
 
 /** A scene that is done in a second: few elements, few rays. */

@@ -399,11 +399,12 @@ fn certify_unless(
             let unsure = !is_given_up(&audit, target) || auditor.paths() < least;
             // As many paths again take about as long as all so far, of which those of this call are known.
             let again = stages.of("audit") + start.elapsed().as_secs_f64();
-            let open = unsure && target < audit.upper && 2 * auditor.paths() <= most_paths && has_time(monitor, again);
-            if !open {
+            let growth = audit.growth(target);
+            let paths = ((growth * f64::from(auditor.paths())).ceil() as u32).min(most_paths);
+            let is_enough = target >= audit.upper || paths <= auditor.paths();
+            if is_enough || !unsure || !has_time(monitor, (growth - 1.0) * again) {
                 return Ok(audit);
             }
-            let paths = (audit.growth(target) * f64::from(auditor.paths())).ceil() as u32;
             if !auditor.trace(paths, |done| monitor.step(done, total)) {
                 return Err(Error::Stopped);
             }

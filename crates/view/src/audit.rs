@@ -24,7 +24,7 @@ const CERTAIN: f64 = 3.0;
 
 /// How many times the paths of an audit grow at least and at most, and how many more than it seems to need it gets: with less, it would often have to look
 /// again, and each look is a chance to be wrong.
-const LEAST_GROWTH: f64 = 1.25;
+const LEAST_GROWTH: f64 = 1.5;
 const MOST_GROWTH: f64 = 2.0;
 const TO_SPARE: f64 = 1.1;
 
@@ -68,8 +68,8 @@ impl Audit {
         square(self.error) - CERTAIN * deviation > square(target)
     }
 
-    /// How many times the paths are to be there to bring the bound to `target`, if the error's estimate stays where it is: the noise of its
-    /// square falls with their number.
+    /// How many times the paths are to be there to bring the bound to `target`, if the error's estimate stays where it is: what the paths
+    /// have to do with the noise of its square falls with their number.
     pub fn growth(&self, target: f64) -> f64 {
         let square = |x: f64| x * x;
         let (noise, room) = (square(self.upper) - square(self.error), square(target) - square(self.error));
@@ -250,12 +250,12 @@ mod tests {
         assert!((wrong.error - 0.03).abs() < 1e-6 && wrong.is_above(0.01), "{wrong:?}");
     }
 
-    /// As many more paths as bring the bound to the target by what is known, a quarter at least, and twice as many where nothing would.
+    /// As many more paths as bring the bound to the target by what is known, half as many at least, and twice as many where nothing would.
     #[test]
     fn paths_grow_as_the_bound_asks() {
         let growth = |error: f64, upper: f64| Audit { error, upper, ..Audit::default() }.growth(0.01);
         assert!((growth(0.008, 0.011) - 1.1 * 0.57 / 0.36).abs() < 1e-9, "{}", growth(0.008, 0.011));
-        assert_eq!([growth(0.005, 0.0101), growth(0.009, 0.03), growth(0.011, 0.02)], [1.25, 2.0, 2.0]);
+        assert_eq!([growth(0.005, 0.0101), growth(0.009, 0.03), growth(0.011, 0.02)], [1.5, 2.0, 2.0]);
         assert_eq!([growth(0.005, f64::INFINITY), growth(f64::INFINITY, f64::INFINITY)], [2.0, 2.0]);
     }
 
