@@ -34,7 +34,7 @@ const ROUNDING: f32 = 1e-6;
 const GROWTH: f32 = 10.0;
 
 /// Triangles with r² less than this part of d² are sampled by area, as directions take longer to sample, and others by direction. Half as much takes the
-/// longer way up to 4.5 r; with twice as much, samples by area from 2.2 r on differ by up to five times.
+/// longer way up to 4.5 r; with twice as much, (d ± r)², by which samples by area differ, spans seven instead of four times.
 const FAR: f64 = 0.1;
 
 /// Share of looks that go to all lamps alike: whatever is wrong with what is told of one, beside a strip of light for example, no look counts more
