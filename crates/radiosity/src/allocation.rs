@@ -79,6 +79,17 @@ impl Found {
         Found { rays: vec![rays; light.len()], light, noise }
     }
 
+    /// Takes in what further rays of all places found, and what these say of the noise, of which they know more.
+    pub fn join(&mut self, more: Found) {
+        for i in 0..self.light.len() {
+            let part = more.rays[i] as f32 / (self.rays[i] + more.rays[i]) as f32;
+            let (own, new) = (self.light[i], more.light[i]);
+            self.light[i] = std::array::from_fn(|k| own[k] + part * (new[k] - own[k]));
+            self.noise[i] = more.noise[i] * part.sqrt();
+            self.rays[i] += more.rays[i];
+        }
+    }
+
     /// Sends more rays from the places that are to have more, as many times as many, up to 2^[`MOST_DOUBLINGS`] ([`curb`]). Whether
     /// any were sent.
     pub fn grow(

@@ -162,6 +162,31 @@ impl<A: Asked> Light<A> {
         Ok(())
     }
 
+    /// Sends more gather rays, from all alike, so that no more `noise` is left in all, lx, or until each has `most`. Before that a few
+    /// tell too little of who is noisy, but enough of what is left when all have shared.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn raise(&mut self, solution: &Solution, noise: f64, most: usize, monitor: &dyn Monitor) -> Result<(), Error> {
+        let began = Instant::now();
+        let [of_gathered, of_direct] = self.noise_by_kind();
+        let [had, _] = self.rays();
+        // Direct light may take half of it.
+        let allowed = noise.powi(2) - of_direct.powi(2).min(0.5 * noise.powi(2));
+        let wanted = (had as f64 * of_gathered.powi(2) / allowed).min(most as f64) as usize;
+        let more = wanted.next_power_of_two().min(most).saturating_sub(had);
+        if more == 0 {
+            return Ok(());
+        }
+        self.sets += 1;
+        let all: Vec<usize> = (0..self.asked.len()).collect();
+        let halves = self.asked.gathered(solution, &all, (more, self.sets), monitor)?;
+        self.gathered.join(Found::of_halves(halves, more as u32, evened));
+        self.share();
+        self.seconds += began.elapsed().as_secs_f64();
+        Ok(())
+    }
+
     /// Sends more rays, so that no more `noise` is left in all, lx; up to `most` times as many as there are, if that is said. Whether
     /// that brought anything.
     pub fn grow(
@@ -379,6 +404,21 @@ mod tests {
             let n = off.len() as f64;
             ((off.iter().map(|x| x * x).sum::<f64>() / n).sqrt(), off.iter().sum::<f64>() / n)
         };
+        // All alike at first, as many as are needed and no more than are allowed.
+        let mut points = Light::new(&solution, &places[..], [64, 1024], &()).unwrap();
+        let (before, enough) = (off(&points).0, 2.0 * points.noise());
+        points.raise(&solution, enough, 512, &()).unwrap();
+        assert_eq!(points.rays()[0], 64);
+        let asked = 0.6 * points.noise();
+        points.raise(&solution, asked, 512, &()).unwrap();
+        let ((after, bias), rays) = (off(&points), points.rays()[0]);
+        assert!(
+            (128..=256).contains(&rays) && after < 0.8 * before && bias.abs() < 0.3 * after,
+            "{rays} {after} {bias}"
+        );
+        assert!((0.5..2.0).contains(&(points.noise() / after)), "{} {after}", points.noise());
+        points.raise(&solution, 0.0, 512, &()).unwrap();
+        assert!(points.rays()[0] == 512 && off(&points).0 < after);
         let mut points = Light::new(&solution, &places[..], [64, 64], &()).unwrap();
         let (before, _) = off(&points);
         assert!(points.noise() > 0.5 * before && points.noise() < 2.0 * before, "{} {before}", points.noise());
