@@ -14,8 +14,8 @@ const MOST_PLANES: usize = 12;
 /// By how much corners may lie beyond a plane that leaves all on one side, relative to the hull's size: it is moved there.
 const ROUNDING: f64 = 1e-9;
 
-/// What reaches in by less than this part of the scene's largest extent may be missed by rounding and nothing else: half of what places are moved off
-/// their surfaces, so that what lies in these does not count. In single precision heights over planes were off by up to nine tenths of it.
+/// By how much planes and boxes are moved outwards against rounding, relative to the scene's largest extent: heights over planes were off by up to nine tenths of it in
+/// single precision, so that nothing that reaches in is missed. It is half of what places are moved off their surfaces: what lies in these is not found.
 const MARGIN: f32 = 2.0 / (1 << 24) as f32;
 
 /// The convex hull of two convex polygons that face each other.
@@ -120,8 +120,7 @@ impl Shaft {
 }
 
 impl Tree {
-    /// Shows `visit` triangles until it breaks off: all that reach into a shaft by more than rounding, perhaps some that do not, and now and then
-    /// one twice. What touches the shaft from outside does not reach into it.
+    /// Shows `visit` triangles until it breaks off: all that reach into a shaft, perhaps some that lie just outside, and now and then one twice.
     pub(crate) fn in_shaft(&self, shaft: &Shaft, visit: &mut impl FnMut(u32) -> ControlFlow<()>) -> ControlFlow<()> {
         let Some([low, high]) = self.bounds else { return ControlFlow::Continue(()) };
         let margin = MARGIN * (high - low).max_element();

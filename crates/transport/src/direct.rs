@@ -54,9 +54,15 @@ const OPENNESS: u32 = 0x02f0;
 pub struct Columns {
     lights: usize,
     seen: Vec<Bands>,
-    mean: Vec<Bands>,
-    shaded: Vec<bool>,
-    sampled: Vec<bool>,
+    all: Vec<Column>,
+}
+
+/// What is told of one receiver.
+#[derive(Clone, Copy, Debug, Default)]
+struct Column {
+    mean: Bands,
+    is_shaded: bool,
+    is_sampled: bool,
 }
 
 impl Columns {
@@ -72,18 +78,18 @@ impl Columns {
 
     /// What all lights give to a receiver.
     pub fn mean(&self, receiver: usize) -> Bands {
-        self.mean[receiver]
+        self.all[receiver].mean
     }
 
     /// Whether any shadow ray of a receiver was stopped. Where all were, a sliver of light may still come in, and is then
     /// all there is.
     pub fn is_shaded(&self, receiver: usize) -> bool {
-        self.shaded[receiver]
+        self.all[receiver].is_shaded
     }
 
     /// Whether what they give is known without any chance: what stands before each was cut out of it.
     pub fn is_exact(&self, receiver: usize) -> bool {
-        !self.sampled[receiver]
+        !self.all[receiver].is_sampled
     }
 }
 
@@ -167,7 +173,7 @@ impl Luminaires {
         let mut total = 0.0;
         for i in (0..receivers.len()).filter(is_reached) {
             total += weight[i];
-            for (sum, e) in sums.iter_mut().zip(columns.seen_by_light(i).iter().chain([&columns.mean[i]])) {
+            for (sum, e) in sums.iter_mut().zip(columns.seen_by_light(i).iter().chain([&columns.all[i].mean])) {
                 (0..3).for_each(|band| sum[band] += weight[i] * f64::from(e[band]));
             }
         }
@@ -175,9 +181,7 @@ impl Luminaires {
             sums.into_iter().map(|sum| sum.map(|sum| (sum / f64::max(total, f64::MIN_POSITIVE)) as f32)).collect();
         for i in (0..receivers.len()).filter(|i| !is_reached(i)) {
             columns.seen[i * kept..][..kept].copy_from_slice(&means[..kept]);
-            columns.mean[i] = means[kept];
-            columns.shaded[i] = true;
-            columns.sampled[i] = true;
+            columns.all[i] = Column { mean: means[kept], is_shaded: true, is_sampled: true };
         }
         columns
     }
@@ -194,13 +198,7 @@ impl Luminaires {
         let (n, lights) = (receivers.len(), self.lights.len());
         // Points are not looked up by others.
         let kept = if n > 0 && receivers.near(0).is_some() { lights } else { 0 };
-        let mut columns = Columns {
-            lights: kept,
-            seen: vec![[0.0; 3]; n * kept],
-            mean: vec![[0.0; 3]; n],
-            shaded: vec![false; n],
-            sampled: vec![false; n],
-        };
+        let mut columns = Columns { lights: kept, seen: vec![[0.0; 3]; n * kept], all: vec![Column::default(); n] };
         let mut reached = vec![lights == 0; n.div_ceil(CHUNK)];
         if lights == 0 {
             return (columns, reached);
@@ -208,16 +206,15 @@ impl Luminaires {
         let done = AtomicUsize::new(0);
         let mut seen: Vec<&mut [Bands]> = columns.seen.chunks_mut(CHUNK * kept.max(1)).collect();
         seen.resize_with(n.div_ceil(CHUNK), Default::default);
-        let chunks = seen.into_iter().zip(columns.mean.chunks_mut(CHUNK)).zip(columns.shaded.chunks_mut(CHUNK));
-        let chunks = chunks.zip(columns.sampled.chunks_mut(CHUNK));
-        let mut chunks: Vec<_> = chunks.zip(&mut reached).enumerate().collect();
+        let chunks = seen.into_iter().zip(columns.all.chunks_mut(CHUNK)).zip(&mut reached);
+        let mut chunks: Vec<_> = chunks.enumerate().collect();
         chunks.sort_by_key(|(chunk, _)| key(*chunk));
         // Whoever stops it is not asked again; what is under way is brought to its end.
-        let _ = chunks.into_par_iter().try_for_each(|(chunk, ((((seen, mean), shaded), sampled), reached))| {
+        let _ = chunks.into_par_iter().try_for_each(|(chunk, ((seen, all), reached))| {
             let mut scratch = self.scratch(RATIO);
             let mut at: Vec<Place> = Vec::new();
             let mut lit: Vec<[f64; 3]> = Vec::new();
-            for (k, mean) in mean.iter_mut().enumerate() {
+            for (k, column) in all.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
                 at.clear();
                 lit.clear();
@@ -226,8 +223,8 @@ impl Luminaires {
                     at.push(*place);
                     lit.extend_from_slice(visible);
                 });
-                shaded[k] = scratch.outcomes & !(CHANCE | SAMPLED) != LIT;
-                sampled[k] = scratch.outcomes & SAMPLED != 0 || !scratch.is_whole;
+                column.is_shaded = scratch.outcomes & !(CHANCE | SAMPLED) != LIT;
+                column.is_sampled = scratch.outcomes & SAMPLED != 0 || !scratch.is_whole;
                 // Where all is lit or all is dark, what is seen from afar has the light of the whole.
                 let mixed = scratch.outcomes & LIT != 0 && scratch.outcomes & DARK != 0;
                 let is_lit = scratch.outcomes & LIT != 0;
@@ -248,7 +245,7 @@ impl Luminaires {
                     }
                     for band in 0..3 {
                         let over_area = sums[band] / f64::max(places, 1.0);
-                        mean[band] += over_area as f32;
+                        column.mean[band] += over_area as f32;
                         if let Some(seen) = seen.get_mut(k * kept + l) {
                             seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
                         }
@@ -256,7 +253,7 @@ impl Luminaires {
                 }
             }
             *reached = true;
-            let so_far = done.fetch_add(mean.len(), Ordering::Relaxed) + mean.len();
+            let so_far = done.fetch_add(all.len(), Ordering::Relaxed) + all.len();
             progress.step(so_far, n).then_some(()).ok_or(Stopped)
         });
         (columns, reached)
@@ -411,9 +408,9 @@ impl Scratch<'_> {
             self.outcomes |= outcome;
         }
 
-        // A place inside a solid is not a part of what is seen. From one that is not, some ray may get away; and where none does
-        // from any place, the mean is nothing over whichever of them.
-        let may_count = self.outcomes & LIT != 0;
+        // A place inside a solid is not a part of what is seen. From one that is not, some ray may get away; and where there is no light
+        // at any place, the mean is nothing over whichever of them.
+        let may_count = self.outcomes & LIT != 0 || self.visible.iter().any(|e| *e != [0.0; 3]);
         for (index, spot) in self.spots.iter_mut().enumerate() {
             if may_count && spot.outcome & DARK != 0 && spot.outcome & LIT == 0 {
                 let is_buried = || receivers.buried(tracer, &spot.place, hash(own ^ index as u32));

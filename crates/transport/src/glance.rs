@@ -10,9 +10,8 @@
 
 use crate::Luminaires;
 use crate::luminaires::{Light, Piece};
-use crate::one_light::{from_point, geometry, sample_piece, tint};
+use crate::one_light::{from_point, sample_piece, tint};
 use glam::DVec3;
-use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{PointLight, luminance};
 use radiosity_trace::sampling::{hash, unit};
 use radiosity_trace::{Place, Tracer};
@@ -120,9 +119,9 @@ impl<'l> Glance<'l> {
             let (e, _) = from_point(self.points[k - self.pieces.len()], tracer, spot, 1, seed);
             return e.map(|e| e / probability);
         };
-        let [x, y] = [0x7, 0x8].map(|k| f64::from(unit(hash(seed ^ k))));
+        let uv = [0x7, 0x8].map(|k| f64::from(unit(hash(seed ^ k))));
         let radius = f64::from(self.lanes[k / LANES].radius[k % LANES]);
-        let (target, weight) = sample((piece, radius), spot, x, y);
+        let (target, weight) = sample_piece(piece, spot, |_, square| radius * radius <= FAR * square, uv);
         if weight <= 0.0 || piece.triangle == spot.triangle || !tracer.mutually_visible(spot, &target, seed) {
             return [0.0; 3];
         }
@@ -152,18 +151,6 @@ impl Lanes {
             self.power[lane] * (grown(height) / square) * (grown(rise) / square)
         })
     }
-}
-
-/// A point of a piece, whose corners are so far from its middle, and its weight: the form-factor density over the sampling density.
-fn sample((piece, radius): (&Piece, f64), spot: &Place, x: f64, y: f64) -> (Place, f64) {
-    let [a, b, c] = piece.corners;
-    let middle = (a + b + c) / 3.0;
-    if radius * radius > FAR * middle.distance_squared(spot.point) {
-        return sample_piece(piece, spot, x, y);
-    }
-    let (p, q) = triangle_from_square(x, y);
-    let target = Place { point: a + p * (b - a) + q * (c - a), normal: piece.normal, triangle: piece.triangle };
-    (target, geometry(spot, &target) * piece.area)
 }
 
 #[cfg(test)]
@@ -201,7 +188,7 @@ mod tests {
     fn looks_have_no_bias_and_little_noise() {
         const LOOKS: u32 = 1 << 14;
         let scene = lamps();
-        let (mesh, luminaires) = prepared(&scene);
+        let (mesh, _, _, luminaires) = prepared(&scene, 10.0);
         let tracer = Tracer::new(&scene, &mesh);
         let glance = Glance::new(&luminaires).unwrap();
         assert_eq!((glance.pieces.len(), glance.points.len()), (8, 1));

@@ -187,7 +187,8 @@ impl Luminaires {
                 }
             }
         }
-        pieces.sort_by_key(|(object, _)| *object);
+        // One side after the other, as what makes a quadrilateral follows each other.
+        pieces.sort_by_key(|(object, piece)| (*object, piece.side as usize));
 
         let mut lights = Vec::new();
         if pieces.chunk_by(|a, b| a.0 == b.0).count() > MOST_LAMPS {
@@ -246,4 +247,26 @@ fn varied(scene: &Scene, triangle: usize) -> bool {
     let see_through = material.alpha_mode != AlphaMode::Opaque;
     material.emissive_texture.is_some()
         || see_through && (material.base_color_texture.is_some() || !scene.colors.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::direct::tests::prepared;
+    use glam::DVec3;
+    use radiosity_scene::{Material, Scene};
+
+    /// Triangles of one object come front and back in turn: two that make a quadrilateral are one panel all the same.
+    #[test]
+    fn a_square_that_shines_on_both_sides_is_two_panels() {
+        let lamp = Material { emissive: [1000.0; 3], double_sided: true, ..Material::default() };
+        let mut scene = Scene { materials: vec![Material::default(), lamp], ..Scene::default() };
+        let quad = |low: DVec3, size: f64| {
+            [low, low + size * DVec3::X, low + size * (DVec3::X + DVec3::Y), low + size * DVec3::Y]
+        };
+        scene.add_quad("floor", 0, quad(DVec3::ZERO, 10.0));
+        scene.add_quad("lamp", 1, quad(DVec3::new(4.0, 4.0, 2.0), 0.5));
+        let (_, _, _, luminaires) = prepared(&scene, 10.0);
+        let panels: Vec<usize> = luminaires.panels[0].iter().map(|panel| panel.corners.len()).collect();
+        assert_eq!(panels, [4, 4]);
+    }
 }

@@ -159,7 +159,7 @@ fn sample_one<'p>(
         rest = factors[k];
     }
     let u = (rest / factors[k]).clamp(0.0, 1.0 - 1e-9);
-    let (target, weight) = sample_piece(&pieces[k], place, u, v);
+    let (target, weight) = sample_piece(&pieces[k], place, is_tiny, [u, v]);
     (weight > 0.0).then(|| (&pieces[k], target, weight * total / factors[k]))
 }
 
@@ -176,8 +176,19 @@ pub fn geometry(from: &Place, to: &Place) -> f64 {
     if square > 0.0 { cosines / (PI * square * square) } else { 0.0 }
 }
 
-/// A point of a piece and its weight: the form-factor density over the sampling density.
-pub fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64) {
+/// Whether a piece is so far away that its solid angle is too small for its own arithmetic; area sampling is as good there.
+pub fn is_tiny(piece: &Piece, square: f64) -> bool {
+    piece.area < 1e-3 * square
+}
+
+/// A point of a piece and its weight: the form-factor density over the sampling density. By area where `is_far` says so of the square of the
+/// distance, and by direction elsewhere.
+pub fn sample_piece(
+    piece: &Piece,
+    place: &Place,
+    is_far: impl Fn(&Piece, f64) -> bool,
+    [x, y]: [f64; 2],
+) -> (Place, f64) {
     let [a, b, c] = piece.corners;
     let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
     // Half of all places look away or lie behind; their solid angles need not be found first.
@@ -185,9 +196,7 @@ pub fn sample_piece(piece: &Piece, place: &Place, x: f64, y: f64) -> (Place, f64
     if (place.point - a).dot(piece.normal) <= 0.0 || !piece.corners.iter().any(is_above) {
         return (seen(a), 0.0);
     }
-    // Far away the solid angle is too small for its own arithmetic, and area sampling is as good.
-    let distance = (a + b + c) / 3.0 - place.point;
-    if piece.area < 1e-3 * distance.length_squared() {
+    if is_far(piece, place.point.distance_squared((a + b + c) / 3.0)) {
         let (p, q) = triangle_from_square(x, y);
         let target = seen(a + p * (b - a) + q * (c - a));
         return (target, geometry(place, &target) * piece.area);

@@ -24,7 +24,7 @@ fn with_lamps(count: usize) -> Scene {
     scene
 }
 
-/// Of few lamps each spot looks at all, of many at one by what elements received. Elements are so large that most
+/// Of few lamps each spot looks at one that is picked at a glance, of many at one by what elements received. Elements are so large that most
 /// of what is hit is near, and half of that goes on as paths: the mean light of points is that of the path tracer, up to a hundredth. It is within 0.5 % here, and 4 % off where
 /// the probability of either way is left out. Far elements are few and small, hence their many rays: with 16 the mean is 2 % off whichever way.
 #[test]
