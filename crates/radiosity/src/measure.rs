@@ -38,7 +38,7 @@ impl Default for MeasureOptions {
 }
 
 /// Cells that a gather at each point looks up, at most, and how many at an error of 1 %: what each has wrong averages out
-/// over its rays.
+/// over its rays. Of many points there are more ([`Crowd`]).
 const LOOKED_UP_CELLS: [f64; 2] = [50_000.0, 5_000.0];
 
 /// Cells along the mean path of light at least, however many rooms there are: a gather over wider ones is a path tracer. With 1.5
@@ -86,6 +86,15 @@ const BALANCED: f64 = 2000.0;
 /// From so many times as many points on, each begins with a few rays: what it gathers is shared with many others.
 const SHARED: f64 = 4.0;
 
+/// Part of the first gather rays that each of them begins with; what is noisy asks for more.
+const FIRST_PART: f64 = 0.125;
+
+/// Exponent by which their cells grow with the points: with one half the solution would keep its part of the time if both took it alike.
+const CELLS_GROW: f64 = 0.4;
+
+/// Exponent by which the noise that is left grows with the points, whose solution is better.
+const NOISE_GROWS: f64 = 0.125;
+
 /// Noise that is left of many points, relative to the error asked, at most: with 0.7 what a camera sees of a furnished office took two rounds at
 /// 2 %, and twice as long.
 const MOST_NOISE: f64 = 0.55;
@@ -108,9 +117,9 @@ impl Crowd {
     fn of(points: usize) -> Crowd {
         let crowd = (points as f64 / BALANCED).max(1.0);
         Crowd {
-            cells: crowd.powf(0.4),
-            noise: (NOISE * crowd.powf(0.125)).min(MOST_NOISE),
-            first: if crowd < SHARED { 1.0 } else { 0.125 },
+            cells: crowd.powf(CELLS_GROW),
+            noise: (NOISE * crowd.powf(NOISE_GROWS)).min(MOST_NOISE),
+            first: if crowd < SHARED { 1.0 } else { FIRST_PART },
         }
     }
 
@@ -443,10 +452,10 @@ fn certify_unless(
             let unsure = !is_given_up(&audit, target) || auditor.paths() < least;
             // As many paths again take about as long as all so far, of which those of this call are known.
             let again = stages.of("audit") + start.elapsed().as_secs_f64();
-            let growth = audit.growth(target);
-            let paths = ((growth * f64::from(auditor.paths())).ceil() as u32).min(most_paths);
+            let before = f64::from(auditor.paths());
+            let paths = ((audit.growth(target) * before).ceil() as u32).min(most_paths);
             let is_enough = target >= audit.upper || paths <= auditor.paths();
-            if is_enough || !unsure || !has_time(monitor, (growth - 1.0) * again) {
+            if is_enough || !unsure || !has_time(monitor, (f64::from(paths) / before - 1.0) * again) {
                 return Ok(audit);
             }
             if !auditor.trace(paths, |done| monitor.step(done, total)) {
