@@ -35,12 +35,12 @@ pub fn deflated_jacobi<T: Transport>(
     // unknowns at will leaves no part to itself.
     let sheets = response.sheets();
     let parts = transport.parts().filter(|_| sheets.is_some());
-    let part = |i: usize| parts.map_or(0, |p| p[i / bands] as usize) * bands + i % bands;
+    let part = |i: usize, band: usize| parts.map_or(0, |p| p[i] as usize) * bands + band;
     let slots = bands * (1 + parts.and_then(|p| p.iter().max()).map_or(0, |p| *p as usize));
     let balance = |x: &[f64]| {
         // ⟨1, x⟩ by part: the inner product with the part's own indicator, gathered in one pass.
         let mut sums = vec![0.0; slots];
-        space.accumulate(x, bands, |i, weighted| sums[part(i)] += weighted);
+        space.accumulate(x, bands, |i, band, weighted| sums[part(i, band)] += weighted);
         sums
     };
     let (mut v, mut fv) = (vec![0.0; n], vec![0.0; n]);
@@ -73,10 +73,10 @@ pub fn deflated_jacobi<T: Transport>(
         // Deflate: the share of v that balances the area integral of the new residual. F is linear, so h follows.
         remainder(response, (e, b, &h), &mut r);
         let multiples = coarse.solve(balance(&r));
-        for i in 0..n {
-            if let Some(c) = multiples[part(i)] {
-                b[i] += c * v[i];
-                h[i] += c * fv[i];
+        for k in 0..n {
+            if let Some(c) = multiples[part(k / bands, k % bands)] {
+                b[k] += c * v[k];
+                h[k] += c * fv[k];
             }
         }
     }
@@ -102,7 +102,7 @@ impl Coarse {
         sheets: Sheets<'_>,
         fv: &[f64],
         bands: usize,
-        part: impl Fn(usize) -> usize,
+        part: impl Fn(usize, usize) -> usize,
     ) {
         let mut passed = vec![0.0; fv.len()];
         for (k, passed) in passed.iter_mut().enumerate() {
@@ -111,9 +111,9 @@ impl Coarse {
             }
         }
         let mut links = BTreeMap::new();
-        space.accumulate(&passed, bands, |k, weighted| {
-            if let Some((other, _)) = sheets.passed(k / bands, bands) {
-                let (to, from) = (part(k), part(other * bands + k % bands));
+        space.accumulate(&passed, bands, |i, band, weighted| {
+            if let Some((other, _)) = sheets.passed(i, bands) {
+                let (to, from) = (part(i, band), part(other, band));
                 if to != from {
                     *links.entry((to, from)).or_insert(0.0) += weighted;
                     self.balance[to] += weighted;

@@ -40,7 +40,7 @@ pub fn lu<T: Rows>(
             }
         }
         let mut x = Mat::from_fn(n, 1, |i, _| e[i * bands + band]);
-        matrix.partial_piv_lu().solve_in_place(&mut x);
+        eliminate(&matrix, &mut x);
         for i in 0..n {
             b[i * bands + band] = x[(i, 0)];
         }
@@ -85,16 +85,27 @@ pub fn cholesky<T: Rows>(
                 place => matrix[(k, place)] -= area * factor,
             });
         }
-        let Ok(factors) = matrix.llt(Side::Lower) else {
-            return Err(SolveError::NotApplicable("the symmetric form is not positive definite; use lu"));
-        };
-        factors.solve_in_place(&mut x);
+        eliminate_symmetric(&matrix, &mut x)?;
         for i in 0..n {
             let at = i * bands + band;
             b[at] = if place[i] == usize::MAX { e[at] } else { x[(place[i], 0)] };
         }
     }
     finish(transport, response, e, b, params, n as f64 / 6.0, step)
+}
+
+/// Solves for the columns of `x` in place. (That faer is called from what is not generic spares callers' crates its translation.)
+pub(crate) fn eliminate(matrix: &Mat<f64>, x: &mut Mat<f64>) {
+    matrix.partial_piv_lu().solve_in_place(x);
+}
+
+/// The same with a matrix that is symmetric and positive definite.
+fn eliminate_symmetric(matrix: &Mat<f64>, x: &mut Mat<f64>) -> Result<(), SolveError> {
+    let Ok(factors) = matrix.llt(Side::Lower) else {
+        return Err(SolveError::NotApplicable("the symmetric form is not positive definite; use lu"));
+    };
+    factors.solve_in_place(x);
+    Ok(())
 }
 
 /// Measures what elimination left, by one application.

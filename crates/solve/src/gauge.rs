@@ -41,20 +41,22 @@ impl Gauge {
         info.residual = own.iter().zip(&self.scale).map(|(r, scale)| relative(r.sqrt(), *scale)).collect();
         let unshot = energy(transport, r, bands);
         info.unshot = unshot.iter().zip(&self.emitted).map(|(own, all)| relative(*own, *all)).collect();
-        info.bound = (0..bands)
-            .map(|band| {
-                let worst = r.iter().skip(band).step_by(bands).fold(0f64, |m, r| m.max(r.abs()));
-                let left = 1.0 - self.contraction[band];
-                if left > 0.0 { worst / left } else { f64::INFINITY }
-            })
-            .collect();
+        let mut worst = vec![0f64; bands];
+        for r in r.chunks_exact(bands) {
+            worst.iter_mut().zip(r).for_each(|(worst, r)| *worst = worst.max(r.abs()));
+        }
+        let bound = |(worst, contraction): (f64, &f64)| {
+            let left = 1.0 - contraction;
+            if left > 0.0 { worst / left } else { f64::INFINITY }
+        };
+        info.bound = worst.into_iter().zip(&self.contraction).map(bound).collect();
     }
 }
 
 /// Σ A_i x_i by band: the energy of a radiosity.
 pub(crate) fn energy<T: Transport>(transport: &T, x: &[f64], bands: usize) -> Vec<f64> {
     let mut sums = vec![0.0; bands];
-    transport.space().accumulate(x, bands, |k, weighted| sums[k % bands] += weighted);
+    transport.space().accumulate(x, bands, |_, band, weighted| sums[band] += weighted);
     sums
 }
 

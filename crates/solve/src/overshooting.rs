@@ -59,7 +59,7 @@ pub fn overshooting<T: Shoot>(
             before = now;
         }
         if advance {
-            ambient.reflected(transport, shots.unshot(), &mut extra);
+            ambient.reflected(&ambient.irradiance(transport, shots.unshot()), &mut extra);
         } else {
             extra.fill(0.0);
         }

@@ -96,11 +96,11 @@ pub fn shooting_ambient<T: Shoot>(
         // one sign, their difference is no larger than the larger.
         let one_sign = shots.unshot().iter().all(|x| *x >= 0.0) || shots.unshot().iter().all(|x| *x <= 0.0);
         let standing_in = ambient.irradiance(transport, shots.unshot());
-        for ((bound, largest), irradiance) in info.bound.iter_mut().zip(&largest).zip(standing_in) {
+        for ((bound, largest), irradiance) in info.bound.iter_mut().zip(&largest).zip(&standing_in) {
             let own = largest * irradiance.abs();
             *bound = if one_sign { bound.max(own) } else { *bound + own };
         }
-        ambient.reflected(transport, shots.unshot(), &mut shown);
+        ambient.reflected(&standing_in, &mut shown);
         add(&mut shown, b);
         if is_done(&shown, &info, params, &mut step)? {
             // What was found good enough early is what was shown.

@@ -134,7 +134,7 @@ pub(crate) fn repeat<T: Rows>(
     }
     let (bands, unknowns) = (response.bands(), transport.space().dim());
     let mut area = vec![0.0; unknowns];
-    transport.space().accumulate(&vec![1.0; unknowns], 1, |i, weight| area[i] = weight);
+    transport.space().accumulate(&vec![1.0; unknowns], 1, |i, _, weight| area[i] = weight);
     let destinations = Destinations::new(transport)?;
     let samples = params.samples.max(1) as f64 * unknowns as f64;
     let walks = Walks { destinations, sheets, bands, area, samples };

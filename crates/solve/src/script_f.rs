@@ -4,8 +4,8 @@
 //! 𝓕 = ε F (I − (1 − ε) F)⁻¹ ε; A_i 𝓕_ij = A_j 𝓕_ji, and in an enclosure rows sum to ε_i. By elimination, N³.
 
 use crate::SolveError;
+use crate::direct::eliminate;
 use faer::Mat;
-use faer::linalg::solvers::Solve;
 
 /// 𝓕 of N surfaces, row by row, from their form factors (row by row) and emittances.
 ///
@@ -29,7 +29,7 @@ pub fn script_f(factors: &[f64], emittances: &[f64]) -> Result<Vec<f64>, SolveEr
     }
     let matrix = Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j)) - (1.0 - emittances[i]) * factors[i * n + j]);
     let mut x = Mat::from_fn(n, n, |i, j| if i == j { emittances[i] } else { 0.0 });
-    matrix.partial_piv_lu().solve_in_place(&mut x);
+    eliminate(&matrix, &mut x);
     let product = Mat::from_fn(n, n, |i, j| factors[i * n + j]) * x;
     let script: Vec<f64> = (0..n * n).map(|k| emittances[k / n] * product[(k / n, k % n)]).collect();
     if script.iter().all(|f| f.is_finite()) {

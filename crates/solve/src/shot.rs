@@ -50,7 +50,7 @@ impl<'a, T: Shoot, R: Response + ?Sized> Shots<'a, T, R> {
     pub fn brightest(&mut self, extra: Option<&[f64]>) -> usize {
         let (energy, bands) = (&mut self.energy, self.response.bands());
         energy.fill(0.0);
-        let mut add = |k: usize, weighted: f64| energy[k / bands] += weighted.abs();
+        let mut add = |i: usize, _: usize, weighted: f64| energy[i] += weighted.abs();
         match extra {
             None => self.transport.space().accumulate(&self.unshot, bands, &mut add),
             Some(extra) => {
@@ -117,11 +117,13 @@ impl Ambient {
         sums.iter().zip(&self.factor).map(|(sum, factor)| sum * factor).collect()
     }
 
-    /// What all unknowns reflect of it: ρ_i times the ambient irradiance.
-    pub fn reflected<T: Transport>(&self, transport: &T, unshot: &[f64], out: &mut [f64]) {
-        let ambient = self.irradiance(transport, unshot);
-        for (k, (out, rho)) in out.iter_mut().zip(&self.reflectance).enumerate() {
-            *out = rho * ambient[k % ambient.len()];
+    /// What all unknowns reflect of an ambient irradiance.
+    pub fn reflected(&self, irradiance: &[f64], out: &mut [f64]) {
+        let bands = irradiance.len();
+        for (out, rho) in out.chunks_exact_mut(bands).zip(self.reflectance.chunks_exact(bands)) {
+            for ((out, rho), irradiance) in out.iter_mut().zip(rho).zip(irradiance) {
+                *out = rho * irradiance;
+            }
         }
     }
 }

@@ -8,8 +8,8 @@ pub trait Space {
     fn dim(&self) -> usize;
     /// Inner product of two fields, band by band.
     fn inner(&self, x: &[f64], y: &[f64], bands: usize) -> Vec<f64>;
-    /// Hands out each number of a field times its weight in the inner product.
-    fn accumulate(&self, x: &[f64], bands: usize, add: impl FnMut(usize, f64));
+    /// Hands out each number of a field, by unknown and band, times its weight in the inner product.
+    fn accumulate(&self, x: &[f64], bands: usize, add: impl FnMut(usize, usize, f64));
 }
 
 /// h = F b for all bands at once.
@@ -121,9 +121,11 @@ impl Space for AreaSpace {
         sum
     }
 
-    fn accumulate(&self, x: &[f64], bands: usize, mut add: impl FnMut(usize, f64)) {
-        for (i, x) in x.iter().enumerate() {
-            add(i, self.area[i / bands] * x);
+    fn accumulate(&self, x: &[f64], bands: usize, mut add: impl FnMut(usize, usize, f64)) {
+        for (i, (x, area)) in x.chunks_exact(bands).zip(&self.area).enumerate() {
+            for (band, x) in x.iter().enumerate() {
+                add(i, band, area * x);
+            }
         }
     }
 }

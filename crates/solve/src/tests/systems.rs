@@ -22,9 +22,32 @@ impl System {
         Ok((b, info))
     }
 
-    /// By elimination.
+    /// By elimination, written out anew. No pivots are looked for: in no row of 1 − R F is the diagonal less than all the rest.
     pub fn exact(&self) -> Vec<f64> {
-        self.solve(Solver::Lu, &Params { tolerance: 1e-11, ..Params::default() }).unwrap().0
+        let n = self.e.len();
+        let mut rows: Vec<Vec<f64>> = (0..n)
+            .map(|i| {
+                let mut row = vec![0.0; n + 1];
+                self.transport.row(i, |j, factor| row[j] -= self.response.reflectance[i] * factor);
+                row[i] += 1.0;
+                row[n] = self.e[i];
+                row
+            })
+            .collect();
+        for k in 0..n {
+            let (above, below) = rows.split_at_mut(k + 1);
+            let pivot = &above[k];
+            for row in below {
+                let times = row[k] / pivot[k];
+                row[k..].iter_mut().zip(&pivot[k..]).for_each(|(own, pivot)| *own -= times * pivot);
+            }
+        }
+        let mut b = vec![0.0; n];
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|j| rows[i][j] * b[j]).sum();
+            b[i] = (rows[i][n] - known) / rows[i][i];
+        }
+        b
     }
 
     /// ‖E + R F B − B‖/‖E‖ weighted by area, written out anew.
