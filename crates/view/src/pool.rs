@@ -6,6 +6,10 @@
 //! least, on average over the places around, is taken (cross-validation; Stone 1974). Where no radius predicts places as well as
 //! their own noise would have it, something is smaller than they are far apart, a contact or a shadow's edge: there a place keeps
 //! its own light in the part by which the prediction is worse (a Wiener filter; Lee 1980).
+//!
+//! Quadrics beside planes, of radii 4 to 16, predict better where light is bent, and points are no nearer to the truth for it: 2,000 in the
+//! Cornell box at 4, 2 and 1 % are 1.04, 0.77 and 0.53 % off instead of 1.10, 0.79 and 0.54, a hundred thousand 0.72, 0.68 and 0.41 instead of 0.69, 0.66 and
+//! 0.42, and 1.73 % either way in a furnished office. What is left lies at edges and contacts, where none of them reaches far. Left out.
 
 use glam::DVec2;
 use radiosity_scene::{Bands, luminance};

@@ -52,7 +52,7 @@ fn no_light_comes_into_a_closed_solid() {
     scene.add_triangles("caps", 0, &caps);
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
-    let solution = Solution::new(&tracer, &SolveOptions::default(), &()).unwrap();
+    let solution = Solution::new(&tracer, &SolveOptions { cells: 2000, ..SolveOptions::default() }, &()).unwrap();
     for (side, is_lit) in [(Side::Front, true), (Side::Back, false)] {
         let at = |t: usize| station(&tracer, t, DVec2::splat(0.1), side);
         let stations: Vec<Station> = (0..2 * FACETS).map(at).collect();
@@ -69,8 +69,8 @@ fn the_field_on_facets_is_that_of_the_curved_surface() {
     let scene = cylinder();
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
-    let mut solution = Solution::new(&tracer, &SolveOptions { cells: 8000, ..SolveOptions::default() }, &()).unwrap();
-    solution.refine(1024, &()).unwrap();
+    let mut solution = Solution::new(&tracer, &SolveOptions { cells: 4000, ..SolveOptions::default() }, &()).unwrap();
+    solution.refine(512, &()).unwrap();
     let field = solution.indirect_field(&()).unwrap();
     let (mut worst, mut of_facets) = (0f64, 0f64);
     for triangle in 0..mesh.triangles.len() {
