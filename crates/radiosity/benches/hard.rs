@@ -191,7 +191,7 @@ fn examine(scene: &Scene, asked: f64, number: usize) -> Result<(), Failure> {
         let answer = measure(&tracer, &points, &options, &())?;
         let seconds = begun.elapsed().as_secs_f64();
         let mut auditor = Auditor::new(&tracer, places, &answer.irradiance, 10_000 + run as u64);
-        auditor.trace(PATHS, |_| true);
+        auditor.trace(PATHS, &|_| true);
         let (truth, audit) = (auditor.judge(&answer.irradiance), &answer.audit);
         runs.push(Run {
             error: truth.error,

@@ -168,7 +168,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
             let light = solution.at(&watched, indirect, &shadowing, monitor)?.irradiance;
             let [direct, gathered] = ["direct light", "gather"].map(|name| solution.stages.of(name));
             let judge = |auditor: &Auditor| auditor.judge(&light);
-            let audit = certify(&mut auditor, judge, options.error, most_paths, &stages, monitor)?;
+            let audit = certify(&mut auditor, &judge, options.error, most_paths, &stages, monitor)?;
             // What is made of the solution takes about as long at each place.
             let each = |seconds: f64, rays: f64| seconds / (rays * watched.len().max(1) as f64).max(1.0);
             let takes = pace::Reading {

@@ -145,7 +145,7 @@ pub(crate) fn divided(
     tracer: &Tracer,
     cells: &Elements,
     variation: f64,
-    progress: &impl Progress,
+    progress: &dyn Progress,
 ) -> Result<Elements, Stopped> {
     // Nothing is asked of light that may vary as it likes, and looking takes seconds in a furnished room.
     if variation == f64::INFINITY {

@@ -33,7 +33,7 @@ impl Matrix {
         mesh: &Mesh,
         elements: &Elements,
         memory: usize,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<Matrix, Error> {
         let enclosure = Enclosure::of_elements(mesh, elements).map_err(Error::Element)?;
         let adaptive = ViewFactorOptions { accuracy: ACCURACY, clear_accuracy: 0.01 * ACCURACY, memory };

@@ -266,7 +266,7 @@ impl<'b, 'a> Judge<'b, 'a> {
         let paths = most_paths(*error);
         if !self.is_close {
             let plain = |auditor: &Auditor| auditor.judge(&read_back);
-            let audit = certify(&mut self.auditor, plain, *error, paths, stages, monitor)?;
+            let audit = certify(&mut self.auditor, &plain, *error, paths, stages, monitor)?;
             // Places do not share what they gather, and so have more rays.
             let takes = self.each * (self.more.len() * (self.gather / self.rays().0.max(1)).max(1)) as f64;
             if audit.upper <= *error || !achieved || !self.or_hurried(has_time(monitor, takes)) {
@@ -282,7 +282,7 @@ impl<'b, 'a> Judge<'b, 'a> {
         let apart = |(station, h): (&Station, &f64)| (f64::from(luminance(read(station))) - h).powi(2);
         let squares: Vec<f64> = self.more.par_iter().zip(&self.light).map(apart).collect();
         let closely = |auditor: &Auditor| auditor.judge_read(&self.at, &read_back, &squares);
-        certify(&mut self.auditor, closely, *error, paths, stages, monitor)
+        certify(&mut self.auditor, &closely, *error, paths, stages, monitor)
     }
 
     /// What is to be done for the error asked after an audit; nothing where it is met, or cannot be.
@@ -347,7 +347,7 @@ impl<'b, 'a> Judge<'b, 'a> {
     /// What the referee says of the solution's light `at` its places.
     fn certify(&mut self, at: &[Bands], target: f64, monitor: &dyn Monitor) -> Result<Audit, Error> {
         let Baked { error, stages, .. } = self.baked;
-        certify(&mut self.auditor, |auditor| auditor.judge(at), target, most_paths(*error), stages, monitor)
+        certify(&mut self.auditor, &|auditor| auditor.judge(at), target, most_paths(*error), stages, monitor)
     }
 }
 

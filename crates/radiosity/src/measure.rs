@@ -6,7 +6,7 @@
 //! budget ends, and the report says which.
 
 use crate::monitor::{Monitor, Stages, has_time, is_over};
-use crate::points::{Light, Rays};
+use crate::points::{Asked, Light, Rays};
 use crate::{Error, Solution, SolveOptions, stations};
 use glam::DVec3;
 use radiosity_scene::{Bands, luminance};
@@ -259,26 +259,14 @@ pub fn measure(
         let begun = Instant::now();
         // Where the first rays found no light they tell no noise either.
         let size = root_mean_square(&light.irradiance()).max(f64::from(f32::MIN_POSITIVE));
-        // What is shared is less noisy than its rays, and the less so the more there are: one step does not do. Within a time limit steps
-        // are short.
-        let most = monitor.deadline().map(|_| 2.0);
-        let mut lacks_time = false;
-        if light.rays()[0] < first[0] {
-            light.raise(&solution, noise_asked * size, first[0], monitor)?;
-        }
-        while light.noise() > ENOUGH * noise_asked * size {
-            lacks_time = !has_time(monitor, 1.5 * light.seconds);
-            if lacks_time || !light.grow(&solution, noise_asked * size, most, monitor)? {
-                break;
-            }
-        }
+        let lacks_time = !quieten(&mut light, &solution, (first[0], noise_asked * size), monitor)?;
         let irradiance = light.irradiance();
         let watched: Vec<Bands> = watched.iter().map(|&i| irradiance[i]).collect();
         // Where no better answer follows, this one is looked at as closely as it takes.
         let is_final = rounds.len() >= options.rounds;
         let target = (options.error, if is_final { Audit::is_above } else { is_hopeless as fn(&Audit, f64) -> bool });
         let judge = |auditor: &Auditor| auditor.judge(&watched);
-        let audit = certify_unless(&mut auditor, judge, target, most_paths, &stages, monitor)?;
+        let audit = certify_unless(&mut auditor, &judge, target, most_paths, &stages, monitor)?;
         rounds.push(Round::new(&solution, light.rays(), &audit, start));
         monitor.note(&rounds[rounds.len() - 1].to_string());
 
@@ -321,21 +309,10 @@ pub fn measure(
             solving = Instant::now();
             stages.absorb(&solution.stages);
             solution.stages = Stages::default();
-            let again = if next.element_size == solve.element_size {
-                solution.refine(next.rays, monitor).map(|()| solution)
-            } else {
-                drop(solution);
-                Solution::new(tracer, &next, monitor)
+            let Some(again) = solved_again(solution, (&solve, &next), tracer, monitor)? else {
+                return Ok(Measurement { rounds, stages, ..answer });
             };
-            solution = match again {
-                // How much room elements take is known once they are made.
-                Err(Error::Memory { .. }) => return Ok(Measurement { rounds, stages, ..answer }),
-                Err(Error::File(error)) => {
-                    monitor.warn(&format!("{error}; the answer is that of the rounds before"));
-                    return Ok(Measurement { rounds, stages, ..answer });
-                }
-                again => again?,
-            };
+            solution = again;
             solution_takes = solving.elapsed().as_secs_f64();
             (solve, solved) = (next, solved + 1);
             // What few rays found may have missed much, and they may tell little noise: twice as many to begin with.
@@ -343,6 +320,54 @@ pub fn measure(
             light.begin(&solution, crowd.first(first), monitor)?;
         }
         best = Some(answer);
+    }
+}
+
+/// Sends rays until no more `noise` is left, lx, after so many first gather rays where points began with fewer. Whether there was time.
+fn quieten<A: Asked>(
+    light: &mut Light<A>,
+    solution: &Solution,
+    (first, noise): (usize, f64),
+    monitor: &dyn Monitor,
+) -> Result<bool, Error> {
+    if light.rays()[0] < first {
+        light.raise(solution, noise, first, monitor)?;
+    }
+    // What is shared is less noisy than its rays, and the less so the more there are: one step does not do. Within a time limit steps
+    // are short.
+    let most = monitor.deadline().map(|_| 2.0);
+    while light.noise() > ENOUGH * noise {
+        if !has_time(monitor, 1.5 * light.seconds) {
+            return Ok(false);
+        }
+        if !light.grow(solution, noise, most, monitor)? {
+            break;
+        }
+    }
+    Ok(true)
+}
+
+/// A solution from one by `before`; none where there is no room for it, of which a file's is told.
+fn solved_again<'t>(
+    mut solution: Solution<'t>,
+    (before, next): (&SolveOptions, &SolveOptions),
+    tracer: &'t Tracer<'t>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Solution<'t>>, Error> {
+    let again = if next.element_size == before.element_size {
+        solution.refine(next.rays, monitor).map(|()| solution)
+    } else {
+        drop(solution);
+        Solution::new(tracer, next, monitor)
+    };
+    match again {
+        // How much room elements take is known once they are made.
+        Err(Error::Memory { .. }) => Ok(None),
+        Err(Error::File(error)) => {
+            monitor.warn(&format!("{error}; the answer is that of the rounds before"));
+            Ok(None)
+        }
+        again => again.map(Some),
     }
 }
 
@@ -422,7 +447,7 @@ fn is_hopeless(audit: &Audit, target: f64) -> bool {
 /// taking an estimate for the truth would refine for the noise of the referee.
 pub(crate) fn certify(
     auditor: &mut Auditor,
-    judge: impl Fn(&Auditor) -> Audit,
+    judge: &dyn Fn(&Auditor) -> Audit,
     target: f64,
     most_paths: u32,
     stages: &Stages,
@@ -434,7 +459,7 @@ pub(crate) fn certify(
 /// The same, until the answer meets the target or is given up.
 fn certify_unless(
     auditor: &mut Auditor,
-    judge: impl Fn(&Auditor) -> Audit,
+    judge: &dyn Fn(&Auditor) -> Audit,
     (target, is_given_up): (f64, fn(&Audit, f64) -> bool),
     most_paths: u32,
     stages: &Stages,
@@ -443,7 +468,7 @@ fn certify_unless(
     let start = Instant::now();
     stages.time(monitor, "audit", || {
         let total = auditor.places().len();
-        if auditor.paths() == 0 && !auditor.trace(FIRST_PATHS, |done| monitor.step(done, total)) {
+        if auditor.paths() == 0 && !auditor.trace(FIRST_PATHS, &|done| monitor.step(done, total)) {
             return Err(Error::Stopped);
         }
         let least = SURE.div_ceil(total.max(1) as u32);
@@ -458,7 +483,7 @@ fn certify_unless(
             if is_enough || !unsure || !has_time(monitor, (f64::from(paths) / before - 1.0) * again) {
                 return Ok(audit);
             }
-            if !auditor.trace(paths, |done| monitor.step(done, total)) {
+            if !auditor.trace(paths, &|done| monitor.step(done, total)) {
                 return Err(Error::Stopped);
             }
         }

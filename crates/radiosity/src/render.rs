@@ -79,7 +79,7 @@ impl View {
         let (places, light): (Vec<Place>, Vec<Bands>) = self.watched.iter().copied().unzip();
         let mut auditor = Auditor::new(baked.solution.tracer(), places, &light, u64::from(baked.seed));
         let judge = |auditor: &Auditor| auditor.judge(&light);
-        certify(&mut auditor, judge, baked.error, most_paths(baked.error), &baked.stages, monitor)
+        certify(&mut auditor, &judge, baked.error, most_paths(baked.error), &baked.stages, monitor)
     }
 }
 

@@ -149,7 +149,7 @@ impl Luminaires {
         tracer: &Tracer,
         receivers: &impl Receivers,
         shadowing: &Shadowing,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<Columns, Stopped> {
         let (columns, reached) = self.columns_so_far(tracer, receivers, shadowing, |chunk| chunk as u32, progress);
         reached.iter().all(|reached| *reached).then_some(columns).ok_or(Stopped)
@@ -163,7 +163,7 @@ impl Luminaires {
         receivers: &impl Receivers,
         shadowing: &Shadowing,
         weight: &[f64],
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Columns {
         let (mut columns, reached) =
             self.columns_so_far(tracer, receivers, shadowing, |chunk| hash(chunk as u32), progress);
@@ -193,7 +193,7 @@ impl Luminaires {
         receivers: &impl Receivers,
         shadowing: &Shadowing,
         key: impl Fn(usize) -> u32,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> (Columns, Vec<bool>) {
         let (n, lights) = (receivers.len(), self.lights.len());
         // Points are not looked up by others.
@@ -269,7 +269,7 @@ impl Luminaires {
         tracer: &Tracer,
         receivers: &impl Receivers,
         shadowing: &Shadowing,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<Vec<Variation>, Stopped> {
         let n = receivers.len();
         let mut variation = vec![Variation::default(); n];

@@ -137,7 +137,7 @@ impl Exposure {
         tracer: &Tracer,
         mesh: &Mesh,
         elements: &Elements,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<Exposure, Stopped> {
         Exposure::with_care(Care::Full, tracer, (mesh, elements), progress)
     }
@@ -150,7 +150,7 @@ impl Exposure {
         care: Care,
         tracer: &Tracer,
         (mesh, elements): (&Mesh, &Elements),
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<Exposure, Stopped> {
         const CHUNK: usize = 1024;
         let done = std::sync::atomic::AtomicUsize::new(0);

@@ -147,7 +147,7 @@ impl FormFactors {
         method: FormFactorMethod,
         enclosure: &Enclosure,
         options: &FormFactorOptions,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<FormFactors, FactorError> {
         let (facets, allowed) = (enclosure.facets.len(), options.adaptive.memory);
         // Values and errors of the whole matrix, and of what is not zero of it.
@@ -315,7 +315,7 @@ pub(crate) fn round_up(x: f64) -> f32 {
 }
 
 /// Every pair by one method, each direction for itself: what they are off from reciprocity is theirs.
-fn by_pairs(method: PairMethod, enclosure: &Enclosure, progress: &impl Progress) -> Result<FormFactors, Stopped> {
+fn by_pairs(method: PairMethod, enclosure: &Enclosure, progress: &dyn Progress) -> Result<FormFactors, Stopped> {
     let facets = &enclosure.facets;
     let blockers = Blockers::new(facets.iter().chain(&enclosure.obstructions));
     let pair = method.build();

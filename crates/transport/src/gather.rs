@@ -69,7 +69,7 @@ impl<'a> Gather<'a> {
         &self,
         receivers: &impl Receivers,
         rays: usize,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<Vec<[Bands; 2]>, Stopped> {
         const CHUNK: usize = 64;
         let n = receivers.len();

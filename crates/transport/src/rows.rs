@@ -264,7 +264,7 @@ impl HitTable {
         (ids, sky): (&IdSpace, &[Bands]),
         receivers: &impl Receivers,
         columns: usize,
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Result<(), ExtendError> {
         let n = receivers.len();
         assert_eq!(n, self.space.area.len());

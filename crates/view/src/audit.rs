@@ -124,7 +124,7 @@ impl<'a> Auditor<'a> {
 
     /// Traces until each estimate has `paths` paths, or as many times more or less as its place gets. `step` is told how many
     /// places are done and may end it, which leaves the estimates as they were.
-    pub fn trace(&mut self, paths: u32, step: impl Fn(usize) -> bool + Sync) -> bool {
+    pub fn trace(&mut self, paths: u32, step: &(dyn Fn(usize) -> bool + Sync)) -> bool {
         if paths <= self.paths {
             return true;
         }
@@ -285,7 +285,7 @@ mod tests {
             let paths = |a: &Auditor, k: usize| a.paths_at(k, 256);
             let (bright, dark) = if light[0][0] > 50.0 { (0, 39) } else { (39, 0) };
             assert_eq!((paths(&auditor, bright), paths(&auditor, dark)), (256 << 1, 256 >> 1));
-            assert!(auditor.trace(64, |_| true) && auditor.trace(4096, |_| true));
+            assert!(auditor.trace(64, &|_| true) && auditor.trace(4096, &|_| true));
             auditor.judge(&vec![[1.0; 3]; 40]).mean_illuminance
         });
         assert!((levels[0] / levels[1] - 1.0).abs() < 0.005, "{levels:?}");

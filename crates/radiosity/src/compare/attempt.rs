@@ -113,7 +113,7 @@ fn make(
     contender: Contender,
     setting: Setting,
     problem: &Problem,
-    progress: &impl Progress,
+    progress: &dyn Progress,
 ) -> Result<(FormFactors, Option<Apart>, usize), Error> {
     match contender {
         Contender::Rays => {
@@ -138,7 +138,7 @@ const DEFAULT_RAYS: usize = 64;
 fn by_rays(
     rays: usize,
     problem: &Problem,
-    progress: &impl Progress,
+    progress: &dyn Progress,
 ) -> Result<(FormFactors, Option<Apart>, usize), Error> {
     let Problem { tracer, elements, area, .. } = problem;
     let (scene, mesh) = (tracer.scene, tracer.mesh);

@@ -233,7 +233,7 @@ fn elements_have_the_mean_over_their_places() {
 }
 
 /// Far from lamps that nothing stands before, three places tell the mean over an element, and near them they are not trusted: not
-/// beside a plate, and not over the length of a strip, whose width is a thousandth of that. There light was missed by three quarters.
+/// beside a plate, and not over the length of a strip, whose width is a thousandth of that: three quarters of the light 15 cm below the lamp were missed.
 #[test]
 fn few_places_tell_the_mean_far_from_lamps_alone() {
     let [plate, strip] = [[0.1, 0.4, 0.0, 0.3], [-1.1, 8.9, 0.1, 0.11]];

@@ -108,7 +108,7 @@ pub fn node_transport(
     mesh: &NodeMesh,
     occlusion: &dyn Occlusion,
     options: &NodeOptions,
-    progress: &impl Progress,
+    progress: &dyn Progress,
 ) -> Result<SparseTransport, NodeError> {
     if !(options.tolerance > 0.0 && options.tolerance < 1.0) {
         return Err(NodeError::Tolerance(options.tolerance));

@@ -145,7 +145,7 @@ const BLOCK: usize = 32;
 pub fn view_factors(
     enclosure: &Enclosure,
     options: &ViewFactorOptions,
-    progress: &impl Progress,
+    progress: &dyn Progress,
 ) -> Result<ViewFactors, FactorError> {
     let areas: Vec<f64> = enclosure.facets.iter().map(radiosity_scene::Facet::area).collect();
     let Some([low, high]) = enclosure.bounds() else { return Ok(ViewFactors::default()) };

@@ -157,7 +157,7 @@ pub fn zone_exchange(
     enclosure: &Enclosure,
     zones: &[Zone],
     options: &ZoneOptions,
-    progress: &impl Progress,
+    progress: &dyn Progress,
 ) -> Result<ZoneExchange, ZoneError> {
     if !(options.accuracy > 0.0 && options.accuracy < 1.0) {
         return Err(ZoneError::Accuracy(options.accuracy));
