@@ -155,11 +155,11 @@ impl ErrorReport {
         }
         let says = match self.estimated {
             estimated if percent(estimated) == percent(0.0) && self.upper_95_one_sided > 0.0 => {
-                "less than it can tell".to_owned()
+                "finds none beyond its own noise".to_owned()
             }
-            estimated => percent(estimated),
+            estimated => format!("says {}", percent(estimated)),
         };
-        let mut line = format!("error asked {}: {verdict}; audit says {says}, {bound}", percent(self.asked));
+        let mut line = format!("error asked {}: {verdict}; audit {says}, {bound}", percent(self.asked));
         if self.is_lost_in_writing() {
             let within = percent(self.solution_upper_95_one_sided);
             line += &format!("; the solution itself is within {within}");

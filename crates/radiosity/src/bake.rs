@@ -123,7 +123,7 @@ struct Reading {
 
 /// How a scene is solved at first. Where it has more triangles than cells are wanted, most are parts of small things, which
 /// take all the time if each has the rays of a cell: they get them by their area, and what is shown is gathered.
-fn suited(tracer: &Tracer, options: &BakeOptions) -> SolveOptions {
+fn suited(tracer: &Tracer, options: &BakeOptions, monitor: &dyn Monitor) -> SolveOptions {
     let mut solve = options.solve;
     solve.looked_up = tracer.mesh.triangles.len() > CELLS && solve.form_factors.is_none();
     solve.cells = solve.cells.max(CELLS);
@@ -133,7 +133,7 @@ fn suited(tracer: &Tracer, options: &BakeOptions) -> SolveOptions {
         solve.rays = solve.rays.max(rays_for(options.error, 512.0, FEWEST_RAYS, 2048));
     }
     solve.suit_method();
-    solve.fit(tracer);
+    solve.fit(tracer, monitor);
     solve
 }
 
@@ -147,7 +147,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let stages = Stages::default();
     let paced = Paced::new(monitor, &options.after);
     let monitor: &dyn Monitor = &paced.monitor;
-    let solve = suited(tracer, options);
+    let solve = suited(tracer, options, monitor);
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
     monitor.round(1, options.rounds + 1);
     let mut solution = Solution::new(tracer, &solve, monitor)?;

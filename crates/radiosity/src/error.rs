@@ -41,7 +41,7 @@ pub enum Error {
     Time(&'static str),
     /// The memory that was allowed does not suffice.
     #[error(
-        "{elements} elements{} and the scene, need {}; {} allowed (use larger elements or allow more; {} MB would be the least)",
+        "{elements} elements{} and the scene, need {}; {} allowed (allow more, or ask for larger elements: {} MB hold the largest)",
         rays.map_or(",".to_owned(), |rays| format!(" with {rays} rays each,")), size(*needed), are(*allowed), least.div_ceil(1 << 20)
     )]
     Memory {

@@ -103,6 +103,29 @@ mod tests {
         }
     }
 
+    /// Where no size is asked for, elements are as large as the memory wants, and it is said; where one is, it is kept, and refused.
+    #[test]
+    fn elements_are_larger_where_the_memory_holds_no_more() {
+        let scene = cornell_box();
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let options = SolveOptions { cells: 20_000, rays: 8, ..SolveOptions::default() };
+        let (least, usual) = (least_memory(&scene), Solution::memory(&tracer, &options));
+        for part in [0.9, 0.5, 0.1] {
+            let memory = least + (part * (usual - least) as f64) as usize;
+            let (mut fitted, monitor) = (SolveOptions { memory, ..options }, Notes(Mutex::default()));
+            assert!(matches!(Solution::new(&tracer, &fitted, &()), Err(Error::Memory { .. })));
+            fitted.fit(&tracer, &monitor);
+            let said = monitor.0.into_inner().unwrap();
+            assert!(said.len() == 1 && said[0].starts_with("elements are"), "{said:?}");
+            assert!(Solution::memory(&tracer, &fitted) > memory / 2, "no larger than that");
+            assert!(Solution::new(&tracer, &fitted, &()).is_ok());
+        }
+        let mut asked = SolveOptions { memory: least, element_size: Some(0.005), ..options };
+        asked.fit(&tracer, &());
+        assert!(matches!(Solution::new(&tracer, &asked, &()), Err(Error::Memory { .. })));
+    }
+
     /// Rays that the memory does not hold are in a file: nothing is coarser for it, no number is another, and it is said.
     #[test]
     fn rays_beyond_the_memory_change_no_number() {

@@ -226,7 +226,7 @@ pub fn measure(
     solve.cells_on_path(tracer, CELLS_ON_PATH);
     solve.variation = solve.variation.min(VARIATION * options.error / crowd.cells.sqrt());
     solve.suit_method();
-    solve.fit(tracer);
+    solve.fit(tracer, monitor);
     let mut first = match monitor.deadline() {
         Some(_) => FEWEST,
         None => std::array::from_fn(|k| rays_for(options.error, FIRST_RAYS[k], FEWEST[k], MOST_FIRST)),

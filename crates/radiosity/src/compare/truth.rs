@@ -63,7 +63,7 @@ pub(super) fn truth<'a>(
     let tracer = problem.tracer;
     let begun = Instant::now();
     let mut options = SolveOptions { memory, ..SolveOptions::default() };
-    options.fit(tracer);
+    options.fit(tracer, monitor);
     let solution = Solution::new(tracer, &options, monitor)?;
     let field = solution.indirect_field(monitor)?;
     let engine_seconds = begun.elapsed().as_secs_f64();

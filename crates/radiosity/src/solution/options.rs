@@ -1,9 +1,9 @@
 //! How to solve: what is asked for, what it may take, and which methods go together.
 
 use super::Solution;
-use crate::Error;
 use crate::displayed::Displayed;
 use crate::equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
+use crate::{Error, Monitor};
 use radiosity_scene::Scene;
 use radiosity_solve::{Params, Solver};
 use radiosity_trace::Tracer;
@@ -135,10 +135,20 @@ impl SolveOptions {
         if is_stored { cells.saturating_mul(self.rays).saturating_mul(ENTRY) } else { 0 }
     }
 
-    /// Fewer rays where they become a matrix that the memory does not hold: an error that is missed tells more than none.
-    pub(crate) fn fit(&mut self, tracer: &Tracer) {
-        while self.rays > LEAST_RAYS && Solution::memory(tracer, self) > self.memory {
+    /// Fewer rays where they become a matrix that the memory does not hold, and larger elements where no size is asked for: an error that
+    /// is missed tells more than none.
+    pub(crate) fn fit(&mut self, tracer: &Tracer, monitor: &dyn Monitor) {
+        let lacks_room = |options: &SolveOptions| Solution::memory(tracer, options) > options.memory;
+        while self.rays > LEAST_RAYS && lacks_room(self) {
             self.rays /= 2;
+        }
+        let usual = element_size(tracer, self);
+        while self.element_size.is_none() && self.cells > 1 && lacks_room(self) {
+            self.cells = self.cells * 3 / 4;
+        }
+        let size = element_size(tracer, self);
+        if size > usual {
+            monitor.note(&format!("elements are {size:.2} m wide, not {usual:.2}: memory holds no more"));
         }
     }
 }
