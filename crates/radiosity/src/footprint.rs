@@ -109,7 +109,7 @@ mod tests {
         let scene = cornell_box();
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let options = SolveOptions { cells: 20_000, rays: 8, ..SolveOptions::default() };
+        let options = SolveOptions { cells: 20_000, rays: 64, ..SolveOptions::default() };
         let (least, usual) = (least_memory(&scene), Solution::memory(&tracer, &options));
         for part in [0.9, 0.5, 0.1] {
             let memory = least + (part * (usual - least) as f64) as usize;
@@ -119,6 +119,7 @@ mod tests {
             let said = monitor.0.into_inner().unwrap();
             assert!(said.len() == 1 && said[0].starts_with("elements are"), "{said:?}");
             assert!(Solution::memory(&tracer, &fitted) > memory / 2, "no larger than that");
+            assert_eq!(fitted.rays, options.rays, "they may lie in a file");
             assert!(Solution::new(&tracer, &fitted, &()).is_ok());
         }
         let mut asked = SolveOptions { memory: least, element_size: Some(0.005), ..options };

@@ -139,16 +139,17 @@ impl SolveOptions {
     /// is missed tells more than none.
     pub(crate) fn fit(&mut self, tracer: &Tracer, monitor: &dyn Monitor) {
         let lacks_room = |options: &SolveOptions| Solution::memory(tracer, options) > options.memory;
-        while self.rays > LEAST_RAYS && lacks_room(self) {
+        // Rays that may lie in a file take none of it.
+        while self.rays > LEAST_RAYS && self.stored(1) > 0 && lacks_room(self) {
             self.rays /= 2;
         }
         let usual = element_size(tracer, self);
         while self.element_size.is_none() && self.cells > 1 && lacks_room(self) {
             self.cells = self.cells * 3 / 4;
         }
-        let size = element_size(tracer, self);
-        if size > usual {
-            monitor.note(&format!("elements are {size:.2} m wide, not {usual:.2}: memory holds no more"));
+        let wider = element_size(tracer, self) / usual;
+        if wider > 1.0 {
+            monitor.note(&format!("elements are {wider:.1} times as wide as usual: memory holds no more"));
         }
     }
 }
