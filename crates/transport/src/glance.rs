@@ -121,7 +121,7 @@ impl<'l> Glance<'l> {
         };
         let uv = [0x7, 0x8].map(|k| f64::from(unit(hash(seed ^ k))));
         let radius = f64::from(self.lanes[k / LANES].radius[k % LANES]);
-        let (target, weight) = sample_piece(piece, spot, |_, square| radius * radius <= FAR * square, uv);
+        let (target, weight) = sample_piece(piece, spot, radius * radius / FAR, uv);
         if weight <= 0.0 || piece.triangle == spot.triangle || !tracer.mutually_visible(spot, &target, seed) {
             return [0.0; 3];
         }

@@ -159,7 +159,7 @@ fn sample_one<'p>(
         rest = factors[k];
     }
     let u = (rest / factors[k]).clamp(0.0, 1.0 - 1e-9);
-    let (target, weight) = sample_piece(&pieces[k], place, is_tiny, [u, v]);
+    let (target, weight) = sample_piece(&pieces[k], place, tiny(&pieces[k]), [u, v]);
     (weight > 0.0).then(|| (&pieces[k], target, weight * total / factors[k]))
 }
 
@@ -176,19 +176,14 @@ pub fn geometry(from: &Place, to: &Place) -> f64 {
     if square > 0.0 { cosines / (PI * square * square) } else { 0.0 }
 }
 
-/// Whether a piece is so far away that its solid angle is too small for its own arithmetic; area sampling is as good there.
-pub fn is_tiny(piece: &Piece, square: f64) -> bool {
-    piece.area < 1e-3 * square
+/// The square of the distance beyond which the solid angle of a piece is too small for its own arithmetic; area sampling is as good there.
+pub fn tiny(piece: &Piece) -> f64 {
+    1e3 * piece.area
 }
 
-/// A point of a piece and its weight: the form-factor density over the sampling density. By area where `is_far` says so of the square of the
-/// distance, and by direction elsewhere.
-pub fn sample_piece(
-    piece: &Piece,
-    place: &Place,
-    is_far: impl Fn(&Piece, f64) -> bool,
-    [x, y]: [f64; 2],
-) -> (Place, f64) {
+/// A point of a piece and its weight: the form-factor density over the sampling density. By area where the square of the distance is beyond
+/// `far`, m², and by direction elsewhere.
+pub fn sample_piece(piece: &Piece, place: &Place, far: f64, [x, y]: [f64; 2]) -> (Place, f64) {
     let [a, b, c] = piece.corners;
     let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
     // Half of all places look away or lie behind; their solid angles need not be found first.
@@ -196,7 +191,7 @@ pub fn sample_piece(
     if (place.point - a).dot(piece.normal) <= 0.0 || !piece.corners.iter().any(is_above) {
         return (seen(a), 0.0);
     }
-    if is_far(piece, place.point.distance_squared((a + b + c) / 3.0)) {
+    if place.point.distance_squared((a + b + c) / 3.0) > far {
         let (p, q) = triangle_from_square(x, y);
         let target = seen(a + p * (b - a) + q * (c - a));
         return (target, geometry(place, &target) * piece.area);

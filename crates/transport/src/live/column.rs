@@ -9,7 +9,7 @@ use super::body::{Bounds, Site, bounds_of, given_at};
 use super::chunk::ROWS;
 use super::world::World;
 use crate::luminaires::Piece;
-use crate::one_light::{geometry, is_tiny, sample_piece};
+use crate::one_light::{geometry, sample_piece, tiny};
 use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Bands, PointLight, PointLightKind, Side, Surface, luminance};
@@ -298,7 +298,7 @@ impl Column {
         };
         match source {
             Source::Piece(piece, triangle) => {
-                let (target, weight) = sample_piece(piece, &place, is_tiny, [stretched, f64::from(v)]);
+                let (target, weight) = sample_piece(piece, &place, tiny(piece), [stretched, f64::from(v)]);
                 if weight <= 0.0 {
                     return None;
                 }
