@@ -447,7 +447,7 @@ fn nothing_escapes_from_closed_meshes_through_edges_or_vertices() {
         let triangles: Vec<_> = mesh.iter().map(|t| t.map(|c| c * scale + offset)).collect();
         let trees = both(&triangles);
         let mut escapes = Vec::new();
-        for i in 0..8_000 {
+        for i in 0..20_000 {
             // From the middle, and from where no axis is special.
             let origin = offset + if i % 2 == 0 { Vec3::ZERO } else { random.point() * 0.00003 * scale };
             let mut corners = triangles[random.below(triangles.len())];
