@@ -64,8 +64,8 @@ const LESS: f64 = 0.7;
 /// Noise and all the rest of the error may have at least this part each of what a round aims at.
 const LEAST_PART: f64 = 0.5;
 
-/// Fewest pairs of estimates that an audit judges by.
-const LEAST_WATCHED: usize = 64;
+/// Fewest estimates that an audit judges by.
+const LEAST_ESTIMATES: usize = 128;
 
 /// Up to how many times as many paths go to each point where points are few.
 const CLOSER: usize = 16;
@@ -240,16 +240,14 @@ pub fn measure(
 
     // The referee looks at every n-th point.
     let stride = places.len().div_ceil(options.audit_points.max(1)).max(1);
-    let mut watched: Vec<usize> = (0..places.len()).step_by(stride).collect();
+    let watched: Vec<usize> = (0..places.len()).step_by(stride).collect();
     // Few points are looked at several times, each time by independent paths, so that the audit knows its own noise.
-    while !watched.is_empty() && watched.len() < LEAST_WATCHED {
-        watched.extend_from_within(..);
-    }
+    let looks = LEAST_ESTIMATES.div_ceil(watched.len().max(1)).max(2);
     let watched_places: Vec<Place> = watched.iter().map(|&i| places[i]).collect();
     let expected = solution.irradiance_at(&watched_places);
-    let mut auditor = Auditor::new(tracer, watched_places, &expected, options.seed);
+    let mut auditor = Auditor::closer(tracer, watched_places, &expected, looks, options.seed);
     // Few points can be looked at more closely for the same work.
-    let closer = (options.audit_points / watched.len().max(1)).clamp(1, CLOSER) as u32;
+    let closer = (2 * options.audit_points / auditor.estimates().max(1)).clamp(1, CLOSER) as u32;
     let most_paths = most_paths(options.error).saturating_mul(closer);
     let (mut rounds, mut solved) = (Vec::new(), 0);
     let mut light = Light::new(&solution, &places[..], crowd.first(first), monitor)?;
@@ -431,11 +429,11 @@ pub(crate) fn most_paths(error: f64) -> u32 {
 }
 
 /// Paths per estimate that every audit begins with.
-pub(crate) const FIRST_PATHS: u32 = 64;
+pub(crate) const FIRST_PATHS: u32 = 48;
 
-/// Paths of the referee, over all places, before a miss is believed: a few thousand, and what one bright path in them
+/// Paths of the referee, over all estimates, before a miss is believed: a few thousand, and what one bright path in them
 /// says of a few places may be wrong by more than its own scatter tells.
-const SURE: u32 = 1 << 16;
+const SURE: u32 = 1 << 17;
 
 /// Whether an answer is not worth a closer look: it may be within the target, but to know that for certain would take
 /// more paths than better answers take rays.
@@ -467,7 +465,7 @@ fn certify_unless(
 ) -> Result<Audit, Error> {
     let start = Instant::now();
     stages.time(monitor, "audit", || {
-        let total = auditor.places().len();
+        let total = auditor.estimates();
         if auditor.paths() == 0 && !auditor.trace(FIRST_PATHS, &|done| monitor.step(done, total)) {
             return Err(Error::Stopped);
         }

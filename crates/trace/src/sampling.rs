@@ -50,6 +50,9 @@ fn sobol(index: u32) -> [u32; 4] {
 }
 
 /// A sequence of points in the unit 4-cube, fixed by its seed.
+///
+/// Points of one index of two sequences are no points of the 8-cube: both are scrambled from the same, so that of what depends on both the mean
+/// over one pair of sequences need not come nearer to the truth with more points. One of the two has to be [`shuffled`].
 #[derive(Clone, Copy, Debug)]
 pub struct Sequence {
     seeds: [u32; 4],
@@ -103,6 +106,14 @@ impl Sequence {
         }
         pairs
     }
+}
+
+/// An index in another order, fixed by a seed, in which each run of 2<sup>k</sup> that begins at a multiple of that stays one (Burley 2020, §4): runs
+/// are stratified as before, and independent of those of other orders. Runs of 4,096 stay where they are.
+#[inline]
+pub fn shuffled(index: u32, seed: u32) -> u32 {
+    let low = TABULATED as u32 - 1;
+    (index & !low) | (owen(index & low, seed) & low)
 }
 
 /// Nested uniform scrambling of the bits of `x`.

@@ -8,7 +8,7 @@
 //! light get its exact factor, and points near a large one, where area sampling goes wrong by factors, are as good
 //! as far ones. Where little stands before a lamp no rays are sent at all (`eclipse.rs`).
 
-use crate::eclipse::Sights;
+use crate::eclipse::{Sights, is_smooth};
 use crate::one_light::{CHANCE, DARK, LIT, SAMPLED, luminance_of};
 use crate::parts::Parts;
 use crate::{Luminaires, Progress, Receivers, Stopped};
@@ -110,6 +110,8 @@ pub struct Variation {
 #[derive(Clone, Copy)]
 struct Spot {
     place: Place,
+    /// Share of the receiver that it stands for.
+    weight: f64,
     /// Where the dealing of its shadow rays begins, in [0, 1).
     offset: f32,
     /// What became of what was settled without rays, and of its shadow rays.
@@ -122,6 +124,8 @@ struct Spot {
 /// The places of a receiver, what is found at one after the other, and the room to work it out.
 struct Scratch<'l> {
     spots: Vec<Spot>,
+    /// Their places and weights.
+    nodes: Vec<(Place, f64)>,
     /// What could give light to each of them, and room for more.
     parts: Vec<Parts<'l>>,
     /// What stands before the lights.
@@ -212,15 +216,17 @@ impl Luminaires {
         // Whoever stops it is not asked again; what is under way is brought to its end.
         let _ = chunks.into_par_iter().try_for_each(|(chunk, ((seen, all), reached))| {
             let mut scratch = self.scratch(RATIO);
-            let mut at: Vec<Place> = Vec::new();
+            let (mut at, mut weights): (Vec<Place>, Vec<f64>) = Default::default();
             let mut lit: Vec<[f64; 3]> = Vec::new();
             for (k, column) in all.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
                 at.clear();
+                weights.clear();
                 lit.clear();
                 self.go_to((tracer, receivers), (i, receivers.seed(i)), (shadowing, true), &mut scratch);
-                scratch.look(tracer, receivers, (i, 0), shadowing.rays, |_, place, visible| {
-                    at.push(*place);
+                scratch.look(tracer, receivers, (i, 0), shadowing.rays, |_, spot, visible| {
+                    at.push(spot.place);
+                    weights.push(spot.weight);
                     lit.extend_from_slice(visible);
                 });
                 column.is_shaded = scratch.outcomes & !(CHANCE | SAMPLED) != LIT;
@@ -234,17 +240,18 @@ impl Luminaires {
                     Some(near) => openness(tracer, &at, near, receivers.seed(i)),
                     None => vec![1.0; at.len()],
                 };
-                let (places, all_open) = (at.len() as f64, open.iter().sum::<f64>());
+                let whole: f64 = weights.iter().sum();
+                let all_open: f64 = open.iter().zip(&weights).map(|(open, weight)| open * weight).sum();
                 for l in 0..lights {
                     let mut sums = [0f64; 6];
-                    for (visible, open) in lit.chunks_exact(lights).zip(&open) {
+                    for ((visible, open), weight) in lit.chunks_exact(lights).zip(&open).zip(&weights) {
                         for band in 0..3 {
-                            sums[band] += visible[l][band];
-                            sums[band + 3] += open * visible[l][band];
+                            sums[band] += weight * visible[l][band];
+                            sums[band + 3] += weight * open * visible[l][band];
                         }
                     }
                     for band in 0..3 {
-                        let over_area = sums[band] / f64::max(places, 1.0);
+                        let over_area = sums[band] / f64::max(whole, f64::MIN_POSITIVE);
                         column.mean[band] += over_area as f32;
                         if let Some(seen) = seen.get_mut(k * kept + l) {
                             seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
@@ -331,6 +338,7 @@ impl Luminaires {
         let lights = self.lights.len();
         Scratch {
             spots: Vec::new(),
+            nodes: Vec::new(),
             parts: Vec::new(),
             sights: Sights::default(),
             used: vec![0; lights],
@@ -348,7 +356,7 @@ impl Luminaires {
         (tracer, receivers): (&Tracer, &impl Receivers),
         (i, seed): (usize, u32),
         (shadowing, is_mean): (&Shadowing, bool),
-        Scratch { spots, parts, sights, exact, is_whole, .. }: &mut Scratch<'l>,
+        Scratch { spots, nodes, parts, sights, exact, is_whole, .. }: &mut Scratch<'l>,
     ) {
         spots.clear();
         exact.clear();
@@ -358,12 +366,23 @@ impl Luminaires {
         let (rays, count) = (shadowing.rays, receivers.places(i, shadowing.places));
         sights.go_to(site, self, count);
         let places = Sequence::new(seed, DIRECT);
-        let thirds = site.thirds().filter(|_| is_mean && sights.are_clear(self, tracer, rays));
-        let count = if thirds.is_some() { 3 } else { count };
-        *is_whole = thirds.is_some() || site.point().is_some();
-        for index in 0..count {
-            let [offset, _, x, y] = places.point(index);
-            let place = thirds.map_or_else(|| site.place(x, y), |thirds| thirds[index as usize]);
+        nodes.clear();
+        *is_whole = site.point().is_some();
+        let is_smooth = |part| is_smooth(self.panels.iter().flatten(), part, site.normal);
+        // Next to a lamp it is worth a look however few rays there would be: some such elements may send half of the light.
+        let worth = |part| if is_smooth(part) { rays } else { u32::MAX };
+        let part = site.part().filter(|_| is_mean);
+        if part.is_some_and(|part| sights.are_clear(self, tracer, worth(part))) {
+            *is_whole = true;
+            site.cubature(is_smooth, nodes);
+        } else {
+            nodes.extend((0..count).map(|index| {
+                let [_, _, x, y] = places.point(index);
+                (site.place(x, y), 1.0 / f64::from(count))
+            }));
+        }
+        for (index, (place, weight)) in (0..).zip(&*nodes) {
+            let (place, [offset, ..]) = (*place, places.point(index));
             if parts.len() == spots.len() {
                 parts.push(Parts::default());
             }
@@ -373,7 +392,7 @@ impl Luminaires {
             let settled = own.settle(self, rays, &mut exact[first..], |light, panel, k, rays| {
                 sights.share((light, panel, k), tracer, &place, rays)
             });
-            spots.push(Spot { place, offset, settled, outcome: 0, is_buried: None });
+            spots.push(Spot { place, weight: *weight, offset, settled, outcome: 0, is_buried: None });
         }
     }
 }
@@ -387,7 +406,7 @@ impl Scratch<'_> {
         receivers: &impl Receivers,
         (i, set): (usize, u32),
         rays: u32,
-        mut visit: impl FnMut(usize, &Place, &[[f64; 3]]),
+        mut visit: impl FnMut(usize, &Spot, &[[f64; 3]]),
     ) {
         let (seed, rays) = (receivers.seed(i), receivers.rays(i, rays));
         let own = if set == 0 { seed } else { hash(seed ^ hash(set)) };
@@ -417,7 +436,7 @@ impl Scratch<'_> {
                 spot.is_buried = Some(spot.is_buried.unwrap_or_else(is_buried));
             }
             if spot.is_buried != Some(true) {
-                visit(index, &spot.place, &self.visible[index * lights..][..lights]);
+                visit(index, spot, &self.visible[index * lights..][..lights]);
             }
         }
     }

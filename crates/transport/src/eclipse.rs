@@ -27,9 +27,12 @@ const FOR_A_RAY: f64 = 8.0;
 /// Fewest rays, over all places of a receiver, for which blockers are looked for: to find none takes as long as some six rays.
 const LEAST_RAYS: f64 = 8.0;
 
-/// Distance of panels over the longest edge of an element from which on three places tell the mean: it is off by up to a thousandth there, by half a percent
+/// Distance of panels from the middle of an element over its longest edge from which on three places tell the mean: it is off by up to a thousandth there, by half a percent
 /// where the lamp is seen at a grazing angle, and by a twentieth next to it. (Of a sliver the width says nothing: its three places miss a lamp above its middle.)
 const FAR: f64 = 2.0;
+
+/// Height above a plane over that edge up to which an element or a lamp lies in it: from there no light comes.
+const BESIDE: f64 = 1e-6;
 
 /// Pieces that are left of a lamp at most: of fifty blockers in an office there are sixteen on average.
 const MOST_PIECES: usize = 64;
@@ -139,15 +142,12 @@ impl Sights {
         self.cuts.visible(place, panel, tracer.offset(), &self.blockers[range])
     }
 
-    /// Whether all there is are panels some way off, and nothing stands before any; without looking where so many `rays` at each place are
-    /// a better way to tell.
+    /// Whether all there is are panels, and nothing stands before any; without looking where so many `rays` at each place are a better way to
+    /// tell.
     pub fn are_clear(&mut self, luminaires: &Luminaires, tracer: &Tracer, rays: u32) -> bool {
-        let Some(site) = self.site else { return false };
         let panels = || luminaires.lights.iter().zip(&luminaires.panels).map(|(_, panels)| panels);
         let rays = f64::from(rays) / panels().map(Vec::len).sum::<usize>() as f64;
-        let mut is_clear = |of: (usize, &Panel, usize)| {
-            is_far(&site, of.1) && self.between(of, tracer, rays).is_some_and(|found| found.is_empty())
-        };
+        let mut is_clear = |of| self.between(of, tracer, rays).is_some_and(|found| found.is_empty());
         panels().enumerate().all(|(light, panels)| {
             !panels.is_empty() && panels.iter().enumerate().all(|(k, panel)| is_clear((light, panel, k)))
         })
@@ -177,15 +177,18 @@ impl Sights {
     }
 }
 
-/// Whether a panel is so far from all of a site that what it gives is smooth there.
-fn is_far(site: &Site, panel: &Panel) -> bool {
-    let Some(outline) = site.outline() else { return false };
-    let centre = |corners: &[DVec3]| corners.iter().sum::<DVec3>() / corners.len() as f64;
-    let (at, lamp) = (centre(&outline), centre(&panel.corners));
-    let radius = panel.corners.iter().map(|p| p.distance(lamp)).fold(0.0, f64::max);
-    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
-    let longest = edges.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-    at.distance(lamp) - radius > FAR * longest
+/// Whether what panels give is smooth over a part of a site with so large a normal: all that give it light are far from it.
+pub(crate) fn is_smooth<'p>(panels: impl IntoIterator<Item = &'p Panel>, part: [DVec3; 3], normal: DVec3) -> bool {
+    let [a, b, c] = part;
+    let (centre, longest) = ((a + b + c) / 3.0, a.distance(b).max(b.distance(c)).max(c.distance(a)));
+    let faces = |corners: &[DVec3], from: DVec3, normal: DVec3| {
+        corners.iter().any(|corner| (corner - from).dot(normal) > BESIDE * longest)
+    };
+    panels.into_iter().all(|panel| {
+        !faces(&panel.corners, centre, normal)
+            || !faces(&part, panel.corners[0], -panel.axes[2])
+            || panel.distance(centre) > FAR * longest
+    })
 }
 
 /// Adds what stands between a receiver and a panel to `blockers`, and answers which these are; none where there is too much, or it

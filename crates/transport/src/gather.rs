@@ -6,10 +6,11 @@
 //! resolved below the size of the elements.
 
 use crate::glance::Glance;
+use crate::glow::{Glow, SOUGHT};
 use crate::parts::Parts;
 use crate::pilot::{AGAIN, Pilot};
 use crate::rows::IdSpace;
-use crate::{Columns, Luminaires, Progress, Receivers, Stopped};
+use crate::{Columns, Luminaires, Progress, Receivers, Site, Stopped};
 use glam::{DVec2, Vec3};
 use radiosity_scene::{Bands, Side, Surface, luminance};
 use radiosity_trace::sampling::{EIGHT, Sequence, cosine_directions, frame, hash, unit};
@@ -44,6 +45,9 @@ const GATHER: u32 = 0x0200;
 /// Those of paths from near hits, for either half of the rays.
 const PATHS: u32 = 0x0210;
 
+/// That of rays to what glows.
+const GLOW: u32 = 0x0220;
+
 /// A solution, as a gather reads it.
 pub struct Gather<'a> {
     /// Who sees whom.
@@ -75,7 +79,12 @@ impl<'a> Gather<'a> {
         let n = receivers.len();
         let half_rays = rays.div_ceil(2).max(1) as u32;
         let peak = self.values.iter().map(|[r, g, b, _]| luminance([*r, *g, *b])).fold(0.0, f32::max).into();
-        let caster = Caster { gather: self, looked_up: self.looked_up(), glance: Glance::new(self.luminaires) };
+        let caster = Caster {
+            gather: self,
+            looked_up: self.looked_up(),
+            glance: Glance::new(self.luminaires),
+            glow: Glow::new(self),
+        };
         let done = AtomicUsize::new(0);
         let mut means = vec![[[0f32; 3]; 2]; n];
         means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
@@ -91,23 +100,24 @@ impl<'a> Gather<'a> {
                 let (sequence, salt) = (Sequence::new(seed, GATHER), hash(seed));
                 let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
                 volley.aim(&sequence, 2 * half_rays);
-                let Volley { points, directions, order, light, near } = &mut volley;
+                let Volley { points, directions, order, light, share, near } = &mut volley;
                 for &index in &*order {
                     let above = only.unwrap_or_else(|| {
                         let [_, _, x, y] = sequence.point(index);
                         Hemisphere::new(self.tracer, &site.place(x, y))
                     });
                     let ray = above.ray(directions[index as usize]);
-                    let (known, spot) = caster.end(&ray, hash(salt ^ index));
-                    light[index as usize] = known.map(f64::from);
-                    near[usize::from(index >= half_rays)].extend(spot.map(|spot| (index, spot)));
+                    let end = caster.end(&ray, hash(salt ^ index));
+                    light[index as usize] = end.light.map(f64::from);
+                    share[index as usize] = caster.share(&above, &ray, &end);
+                    near[usize::from(index >= half_rays)].extend(end.spot.map(|spot| (index, spot)));
                 }
                 for (half, near) in (0..).zip(near) {
                     caster.follow(near, light, (seed, half, salt), &mut parts);
                 }
                 pilot.place(k, &site, 2 * half_rays);
-                for (index, (point, light)) in points.iter().zip(light).enumerate() {
-                    pilot.add(k, usize::from(index >= half_rays as usize), *point, *light);
+                for (index, ((point, light), share)) in points.iter().zip(light).zip(share).enumerate() {
+                    pilot.add(k, usize::from(index >= half_rays as usize), *point, light.map(|l| *share * l));
                 }
             }
             for (k, mean) in means.iter_mut().enumerate() {
@@ -116,8 +126,10 @@ impl<'a> Gather<'a> {
                 let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
                 *mean = pilot.mean(k, (&sequence, 0), |index, [u, v, x, y]| {
                     let above = only.unwrap_or_else(|| Hemisphere::new(self.tracer, &site.place(x, y)));
-                    caster.arriving(&above.towards([u, v]), hash(salt ^ index), &mut parts)
+                    caster.arriving(&above, &above.towards([u, v]), hash(salt ^ index), &mut parts)
                 });
+                let sought = caster.sought((&site, seed), half_rays, &mut parts);
+                (0..2).for_each(|half| (0..3).for_each(|band| mean[half][band] += sought[half][band]));
             }
             let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
             progress.step(so_far, n).then_some(()).ok_or(Stopped)
@@ -144,6 +156,8 @@ struct Volley {
     directions: Vec<[f32; 3]>,
     order: Vec<u32>,
     light: Vec<[f64; 3]>,
+    /// What of it counts.
+    share: Vec<f64>,
     /// By halves, those that met what is near.
     near: [Vec<(u32, Spot)>; 2],
 }
@@ -173,6 +187,7 @@ impl Volley {
             *next += 1;
         }
         self.light.resize(rays as usize, [0.0; 3]);
+        self.share.resize(rays as usize, 1.0);
         self.near.iter_mut().for_each(Vec::clear);
     }
 }
@@ -190,13 +205,14 @@ fn cell(point: [f32; 2]) -> usize {
 /// Directions over the surface at a place, and the rays that go there.
 #[derive(Clone, Copy)]
 struct Hemisphere {
+    place: Place,
     fan: Fan,
     frame: [Vec3; 3],
 }
 
 impl Hemisphere {
     fn new(tracer: &Tracer, place: &Place) -> Hemisphere {
-        Hemisphere { fan: tracer.fan(place), frame: frame(place.normal).map(|axis| axis.as_vec3()) }
+        Hemisphere { place: *place, fan: tracer.fan(place), frame: frame(place.normal).map(|axis| axis.as_vec3()) }
     }
 
     /// The ray in a direction of the frame about the normal.
@@ -219,6 +235,17 @@ struct Spot {
     id: u32,
 }
 
+/// What a ray met.
+#[derive(Clone, Copy)]
+struct End {
+    /// Its radiosity.
+    light: Bands,
+    /// The spot if that is near.
+    spot: Option<Spot>,
+    id: u32,
+    distance: f32,
+}
+
 /// Whether a path goes on from what is near.
 fn is_followed(seed: u32) -> bool {
     f64::from(unit(hash(seed ^ 0x6))) < FOLLOWED
@@ -236,15 +263,54 @@ struct Caster<'g, 'a> {
     looked_up: Vec<[f32; 4]>,
     /// What picks one of all lamps, where they are few.
     glance: Option<Glance<'a>>,
+    /// What is sought, if anything is worth it.
+    glow: Option<Glow>,
 }
 
 impl<'a> Caster<'_, 'a> {
-    /// Radiosity that arrives along a ray, without that of the luminaires.
+    /// Radiosity that arrives along a ray from a place, without that of the luminaires and what is sought.
     #[inline]
-    fn arriving(&self, ray: &Ray, seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
-        match self.end(ray, seed) {
-            (light, Some(spot)) if is_followed(seed) => self.followed(light, spot, (draw(seed), seed), parts),
-            (light, _) => light.map(f64::from),
+    fn arriving(&self, above: &Hemisphere, ray: &Ray, seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
+        let end = self.end(ray, seed);
+        let share = self.share(above, ray, &end);
+        self.seen(&end, seed, parts).map(|light| share * light)
+    }
+
+    /// What counts of the light that a ray has from its end.
+    #[inline]
+    fn share(&self, above: &Hemisphere, ray: &Ray, end: &End) -> f64 {
+        let found = |glow: &Glow| glow.found(end.id, &above.place, ray.direction.as_dvec3(), end.distance.into());
+        self.glow.as_ref().map_or(1.0, found)
+    }
+
+    /// The mean over the hemisphere of a site of what is sought, by either half of its rays.
+    fn sought(&self, (site, seed): (&Site, u32), half_rays: u32, parts: &mut Parts<'a>) -> [Bands; 2] {
+        let Some(glow) = &self.glow else { return Default::default() };
+        let (sequence, salt) = (Sequence::new(seed, GLOW), hash(seed ^ GLOW));
+        let rays = (SOUGHT * f64::from(half_rays)).ceil() as u32;
+        [0, rays].map(|first| {
+            let mut sum = [0.0; 3];
+            for index in first..first + rays {
+                let [u, v, x, y] = sequence.point(index);
+                let above = Hemisphere::new(self.gather.tracer, &site.place(x, y));
+                let drawn = [u, v].map(f64::from);
+                let Some((id, direction, counts)) = glow.sought(self.gather, &above.place, drawn) else { continue };
+                let seed = hash(salt ^ index);
+                let end = self.end(&above.fan.ray(direction.as_vec3(), f32::INFINITY), seed);
+                if end.id == id {
+                    let light = self.seen(&end, seed, parts);
+                    (0..3).for_each(|band| sum[band] += counts * light[band]);
+                }
+            }
+            sum.map(|light: f64| (light / f64::from(rays)) as f32)
+        })
+    }
+
+    /// The light of what a ray met, and of what that sees where it is near.
+    fn seen(&self, end: &End, seed: u32, parts: &mut Parts<'a>) -> [f64; 3] {
+        match end.spot {
+            Some(spot) if is_followed(seed) => self.followed(end.light, spot, (draw(seed), seed), parts),
+            _ => end.light.map(f64::from),
         }
     }
 
@@ -271,20 +337,19 @@ impl<'a> Caster<'_, 'a> {
         }
     }
 
-    /// Radiosity of what a ray meets, and the spot if that is near.
+    /// What a ray meets.
     #[inline]
-    fn end(&self, ray: &Ray, seed: u32) -> (Bands, Option<Spot>) {
+    fn end(&self, ray: &Ray, seed: u32) -> End {
         let Gather { tracer, ids, .. } = self.gather;
         let found = tracer.first(ray, seed);
         let id = ids.id(found, ray.direction.as_dvec3());
         let [r, g, b, near] = self.looked_up[id as usize];
-        let spot = match found {
-            Found::Surface { triangle, uv, side, distance } if distance < near => {
-                Some(Spot { triangle: triangle as usize, uv, side, id })
-            }
-            _ => None,
-        };
-        ([r, g, b], spot)
+        let (mut spot, mut distance) = (None, f32::INFINITY);
+        if let Found::Surface { triangle, uv, side, distance: t } = found {
+            distance = t;
+            spot = (t < near).then_some(Spot { triangle: triangle as usize, uv, side, id });
+        }
+        End { light: [r, g, b], spot, id, distance }
     }
 
     /// The same along a ray that met `light` and goes on as a path from the very spot, first to a direction and by a light that are `drawn`.
@@ -331,7 +396,7 @@ impl<'a> Caster<'_, 'a> {
                 None => gather.one_light(&place, element as usize, (pick, seed), parts),
             };
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
-            let (light, spot) = self.end(&Hemisphere::new(gather.tracer, &place).towards([u, v]), seed);
+            let End { light, spot, .. } = self.end(&Hemisphere::new(gather.tracer, &place).towards([u, v]), seed);
             end = (light, spot.filter(|_| is_followed(seed)));
             drawn = draw(seed);
         }

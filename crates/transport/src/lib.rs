@@ -12,6 +12,7 @@ pub mod exposure;
 pub mod form_factors;
 pub mod gather;
 mod glance;
+mod glow;
 pub(crate) mod lanes;
 pub mod live;
 pub mod luminaires;

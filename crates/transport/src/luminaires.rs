@@ -44,6 +44,21 @@ pub(crate) struct Panel {
 }
 
 impl Panel {
+    /// How far a point is from it.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let edges = self.corners.iter().zip(self.corners.iter().cycle().skip(1));
+        let is_above = edges.clone().all(|(a, b)| (b - a).cross(point - a).dot(self.axes[2]) <= 0.0);
+        if is_above {
+            return (point - self.corners[0]).dot(self.axes[2]).abs();
+        }
+        let from_edge = |(a, b): (&DVec3, &DVec3)| {
+            let along = b - a;
+            let share = ((point - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            point.distance(a + share * along)
+        };
+        edges.map(from_edge).fold(f64::INFINITY, f64::min)
+    }
+
     /// Those of a light, one for each piece or two that follow each other.
     fn of(pieces: &[Piece]) -> Vec<Panel> {
         let mut panels: Vec<Panel> = Vec::new();

@@ -16,6 +16,9 @@ const BORDER: f64 = 4.0;
 /// so were others.
 const IN_LIGHT: u32 = 8;
 
+/// How often an element is quartered next to a lamp.
+const QUARTERED: i32 = 5;
+
 /// But not fewer than this.
 const LEAST: u32 = 8;
 
@@ -76,13 +79,28 @@ impl Site {
         self.normals.is_none().then(|| SmallVec::from_slice(&[origin, origin + along, origin + across]))
     }
 
-    /// Places over which what is smooth has the mean that it has over the site, to the second degree; none where parts of it are
-    /// not exposed.
-    pub(crate) fn thirds(&self) -> Option<[Place; 3]> {
-        let Site { origin, edges: [along, across], normal, triangle, mask, .. } = *self;
+    /// Its corners, where it is a flat triangle all of which is exposed.
+    pub(crate) fn part(&self) -> Option<[DVec3; 3]> {
+        let Site { origin, edges: [along, across], mask, .. } = *self;
         let is_whole = mask == u64::MAX && self.normals.is_none() && self.point().is_none();
-        let at = |(u, v): (f64, f64)| Place { point: origin + u * along + v * across, normal, triangle };
-        is_whole.then(|| [(1.0 / 6.0, 1.0 / 6.0), (2.0 / 3.0, 1.0 / 6.0), (1.0 / 6.0, 2.0 / 3.0)].map(at))
+        is_whole.then_some([origin, origin + along, origin + across])
+    }
+
+    /// Places with weights that add up to one, over which a function has the mean that it has over a whole site: three to each part of it where it is
+    /// smooth, to the second degree. Other parts are quartered, a few times at most.
+    pub(crate) fn cubature(&self, is_smooth: impl Fn([DVec3; 3]) -> bool, nodes: &mut Vec<(Place, f64)>) {
+        let Site { origin, edges: [along, across], normal, triangle, .. } = *self;
+        let mut parts = vec![([origin, origin + along, origin + across], 0)];
+        while let Some(([a, b, c], depth)) = parts.pop() {
+            if depth < QUARTERED && !is_smooth([a, b, c]) {
+                let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(from, to)| 0.5 * (from + to));
+                parts.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]].map(|part| (part, depth + 1)));
+                continue;
+            }
+            let weight = 0.25f64.powi(depth) / 3.0;
+            let at = |point| (Place { point, normal, triangle }, weight);
+            nodes.extend([(a, b, c), (b, c, a), (c, a, b)].map(|(near, p, q)| at((4.0 * near + p + q) / 6.0)));
+        }
     }
 
     /// The place that (x, y) in the unit square maps to.

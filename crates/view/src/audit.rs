@@ -5,6 +5,10 @@
 //! everything — mesh, rows, solver, interpolation, leaks — and a·b is one of E². The cost does not depend on the size
 //! of the scene. Its resolution is about σ/K^¼, σ being the referee's own relative noise.
 //!
+//! Where points are few, each is looked at more often: of n estimates, all pairs are multiplied, ((Σd)² − Σd²)/(n(n − 1)) with
+//! d = h − a, which is what one product is for two (a U-statistic: Hoeffding 1948). Its variance is 2s⁴/(n(n − 1)) + 4μ²s²/n at each point, s² being the variance of an
+//! estimate and μ the error; n/2 separate pairs of them would have n − 1 times as much of the first. The bound is then about these points, not about those that they might stand for.
+//!
 //! Where light m is handed out that was read from an answer h, (m − a)(m − b) = (m − h)² + (m − h)(2h − a − b) + (h − a)(h − b), and
 //! the first part needs no referee: its mean is taken over many more places. That is where edges of shadows are, which
 //! hold most of the error on a hundredth of the area, so that K points alone bound it badly.
@@ -32,15 +36,15 @@ const TO_SPARE: f64 = 1.1;
 /// most, the few places beside a lamp would take all the time.
 const DOUBLINGS: [i32; 2] = [-2, 4];
 
-/// Fewer points than this get no bound: the spread of heavy-tailed products cannot be told from a handful.
-pub const FEWEST_POINTS: usize = 30;
+/// Fewer pairs of estimates than this give no bound: the spread of heavy-tailed products cannot be told from a handful.
+pub const FEWEST_PAIRS: usize = 30;
 
 /// What the audit found.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Audit {
     /// Points examined.
     pub points: usize,
-    /// Paths per estimate where light is as bright as on average; two estimates per point.
+    /// Paths per estimate where light is as bright as on average; two estimates per point, more where points are few.
     pub paths: u32,
     /// Estimated relative L2 error of irradiance (luminance-weighted): ‖h − E‖/‖E‖. An estimate below zero, which
     /// noise can produce, is given as zero.
@@ -85,8 +89,10 @@ pub struct Auditor<'a> {
     places: Vec<Place>,
     /// By how many powers of two more paths than `paths` go to each place.
     doublings: Vec<i32>,
-    /// The two independent estimates of illuminance at each place, lx.
-    estimates: Vec<[f64; 2]>,
+    /// How many independent estimates there are of each place.
+    looks: usize,
+    /// Those of illuminance, lx, `looks` of each place.
+    estimates: Vec<f64>,
     paths: u32,
     seed: u64,
 }
@@ -98,6 +104,12 @@ impl<'a> Auditor<'a> {
     /// box. By the root of light it takes 0.86 and 1.01 times the paths that it takes with as many everywhere; by its power 4/3, 1.31 and 1.49 times.
     /// Whatever is expected, estimates are unbiased. Different seeds are independent.
     pub fn new(tracer: &'a Tracer<'a>, places: Vec<Place>, light: &[Bands], seed: u64) -> Auditor<'a> {
+        Auditor::closer(tracer, places, light, 2, seed)
+    }
+
+    /// The same with so many estimates at each place, two or more; with more, what is judged is the light at these places alone.
+    pub fn closer(tracer: &'a Tracer<'a>, places: Vec<Place>, light: &[Bands], looks: usize, seed: u64) -> Auditor<'a> {
+        assert!(looks >= 2);
         assert_eq!(places.len(), light.len());
         let light: Vec<f64> = light.iter().map(|&e| f64::from(luminance(e))).collect();
         let known = light.iter().filter(|e| **e > 0.0).count();
@@ -107,9 +119,9 @@ impl<'a> Auditor<'a> {
             true => (0.5 * (e / mean).log2()).round().clamp(least, most) as i32,
             false => 0,
         };
-        let estimates = vec![[0.0; 2]; places.len()];
+        let estimates = vec![0.0; looks * places.len()];
         let doublings = light.iter().map(doublings).collect();
-        Auditor { referee: Referee::new(tracer), places, doublings, estimates, paths: 0, seed }
+        Auditor { referee: Referee::new(tracer), places, doublings, looks, estimates, paths: 0, seed }
     }
 
     /// The places, in the order in which answers are expected.
@@ -122,29 +134,31 @@ impl<'a> Auditor<'a> {
         self.paths
     }
 
+    /// How many estimates there are, over all places.
+    pub fn estimates(&self) -> usize {
+        self.estimates.len()
+    }
+
     /// Traces until each estimate has `paths` paths, or as many times more or less as its place gets. `step` is told how many
-    /// places are done and may end it, which leaves the estimates as they were.
+    /// estimates are done and may end it, which leaves them as they were.
     pub fn trace(&mut self, paths: u32, step: &(dyn Fn(usize) -> bool + Sync)) -> bool {
         if paths <= self.paths {
             return true;
         }
         let done = std::sync::atomic::AtomicUsize::new(0);
         let (this, first, seed) = (&*self, self.paths, self.seed);
-        let refined: Option<Vec<[f64; 2]>> = (0..this.places.len())
+        let refined: Option<Vec<f64>> = (0..this.estimates.len())
             .into_par_iter()
-            .map(|i| {
-                let [had, has] = [first, paths].map(|paths| this.paths_at(i, paths));
-                let pair = std::array::from_fn(|half| {
-                    let seed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
-                        ^ (i as u64) << 32
-                        ^ u64::from(first) << 1
-                        ^ half as u64;
-                    let added = f64::from(luminance(this.referee.irradiance(&this.places[i], has - had, seed)));
-                    let share = f64::from(had) / f64::from(has);
-                    share * this.estimates[i][half] + (1.0 - share) * added
-                });
+            .map(|k| {
+                let (place, look) = (k / this.looks, k % this.looks);
+                let [had, has] = [first, paths].map(|paths| this.paths_at(place, paths));
+                let seed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                    ^ (place as u64) << 32
+                    ^ (u64::from(first) * this.looks as u64 + look as u64);
+                let added = f64::from(luminance(this.referee.irradiance(&this.places[place], has - had, seed)));
+                let share = f64::from(had) / f64::from(has);
                 let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-                step(so_far).then_some(pair)
+                step(so_far).then_some(share * this.estimates[k] + (1.0 - share) * added)
             })
             .collect();
         let Some(refined) = refined else { return false };
@@ -165,67 +179,104 @@ impl<'a> Auditor<'a> {
         if self.paths == 0 || h.is_empty() {
             return Audit { upper: f64::INFINITY, ..Audit::default() };
         }
-        judge(&self.estimates, h, None, self.paths)
+        judge((&self.estimates, self.looks), h, None, self.paths)
     }
 
     /// Judges light `read` from an answer `h` and handed out, both at each place, by what it differs from that answer at
     /// other places as well: `squares` are squared differences in luminance, lx², at places spread evenly by area.
     pub fn judge_read(&self, h: &[Bands], read: &[Bands], squares: &[f64]) -> Audit {
         assert_eq!((self.places.len(), self.places.len()), (h.len(), read.len()));
-        if self.paths == 0 || h.is_empty() || squares.len() < FEWEST_POINTS {
+        if self.paths == 0 || h.is_empty() || squares.len() < FEWEST_PAIRS {
             return self.judge(read);
         }
-        judge(&self.estimates, read, Some((h, squares)), self.paths)
+        judge((&self.estimates, self.looks), read, Some((h, squares)), self.paths)
     }
 }
 
-fn judge(estimates: &[[f64; 2]], m: &[Bands], from: Option<(&[Bands], &[f64])>, paths: u32) -> Audit {
-    let n = estimates.len() as f64;
-    // Both estimates, the light judged, and what it was read from.
-    let places: Vec<[f64; 4]> = (0..estimates.len())
-        .map(|i| {
+/// Mean of the products of all pairs of different numbers, an unbiased estimate of the square of what they are estimates of; two or more.
+fn mean_product(x: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = x.clone().count() as f64;
+    let [sum, squares] = x.fold([0.0; 2], |[sum, squares], x| [sum + x, squares + x * x]);
+    (sum * sum - squares) / (n * (n - 1.0))
+}
+
+/// What estimates say of a place.
+struct Judged {
+    /// Of the square of the light.
+    square: f64,
+    /// Of the squared error, less the part that needs no referee.
+    error: f64,
+    /// The variance of that, by the estimates.
+    variance: f64,
+    /// Of the light itself.
+    level: f64,
+    /// Of the error, and its variance.
+    shift: [f64; 2],
+}
+
+impl Judged {
+    /// By estimates of a place where light `m` is handed out that was read from `h`.
+    fn new(estimates: &[f64], m: f64, h: f64) -> Judged {
+        let n = estimates.len() as f64;
+        let level = estimates.iter().sum::<f64>() / n;
+        let spread = estimates.iter().map(|a| (a - level).powi(2)).sum::<f64>() / (n - 1.0);
+        let error = mean_product(estimates.iter().map(|a| m - a));
+        Judged {
+            square: mean_product(estimates.iter().copied()),
+            error: error - (m - h).powi(2),
+            variance: 2.0 * spread * spread / (n * (n - 1.0)) + 4.0 * error.max(0.0) * spread / n,
+            level,
+            shift: [m - level, spread / n],
+        }
+    }
+}
+
+/// Judges by so many estimates of each place: two, by what they scatter over places, or more, by what they scatter at each.
+fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands], &[f64])>, paths: u32) -> Audit {
+    let points = m.len();
+    let places: Vec<Judged> = estimates
+        .chunks_exact(looks)
+        .enumerate()
+        .map(|(i, estimates)| {
             let m_i = f64::from(luminance(m[i]));
-            let h_i = from.map_or(m_i, |(h, _)| f64::from(luminance(h[i])));
-            let [a, b] = estimates[i];
-            [a, b, m_i, h_i]
+            Judged::new(estimates, m_i, from.map_or(m_i, |(h, _)| f64::from(luminance(h[i]))))
         })
         .collect();
-    let mean = |f: &dyn Fn(&[f64; 4]) -> f64| places.iter().map(f).sum::<f64>() / n.max(1.0);
-    let deviation = |f: &dyn Fn(&[f64; 4]) -> f64, mean: f64| {
-        (places.iter().map(|p| (f(p) - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
+    if estimates.iter().all(|a| *a == 0.0) {
+        // Where the referee finds no light at all, no light is right and any other answer infinitely wrong.
+        let is_dark = m.iter().all(|m| luminance(*m) == 0.0);
+        let error = if is_dark { 0.0 } else { f64::INFINITY };
+        return Audit { points, paths, error, upper: error, ..Audit::default() };
+    }
+    let n = points as f64;
+    let mean = |f: &dyn Fn(&Judged) -> f64| places.iter().map(f).sum::<f64>() / n.max(1.0);
+    // Of a mean over places, what each is and the variance of that.
+    let deviation = |f: &dyn Fn(&Judged) -> [f64; 2]| match looks {
+        2 => {
+            let mean = mean(&|p| f(p)[0]);
+            (places.iter().map(|p| (f(p)[0] - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
+        }
+        _ => places.iter().map(|p| f(p)[1]).sum::<f64>().sqrt() / n,
     };
-    let product = |[a, b, m, h]: &[f64; 4]| (m - a) * (m - b) - (m - h) * (m - h);
-    let square = mean(&|[a, b, ..]| a * b).max(f64::MIN_POSITIVE);
+    let square = mean(&|p| p.square).max(f64::MIN_POSITIVE);
     let squares = from.map_or(&[][..], |(_, squares)| squares);
     let count = squares.len() as f64;
     let apart = squares.iter().sum::<f64>() / count.max(1.0);
     let spread = squares.iter().map(|s| (s - apart).powi(2)).sum::<f64>() / (count * (count - 1.0)).max(1.0);
-    let by_referee = mean(&product);
-    let squared_error = by_referee + apart;
-    let noise = deviation(&product, by_referee).hypot(spread.sqrt());
-    let level = mean(&|[a, b, ..]| 0.5 * (a + b));
-    let shift = |[a, b, m, _]: &[f64; 4]| m - 0.5 * (a + b);
-    let bias = mean(&shift);
-    if estimates.iter().all(|[a, b]| *a == 0.0 && *b == 0.0) {
-        // Where the referee finds no light at all, no light is right and any other answer infinitely wrong.
-        let is_dark = places.iter().all(|[_, _, m, _]| *m == 0.0);
-        let error = if is_dark { 0.0 } else { f64::INFINITY };
-        return Audit { points: estimates.len(), paths, error, upper: error, ..Audit::default() };
-    }
+    let squared_error = mean(&|p| p.error) + apart;
+    let noise = deviation(&|p| [p.error, p.variance]).hypot(spread.sqrt());
+    let level = mean(&|p| p.level).max(f64::MIN_POSITIVE);
     let root = |x: f64| (x.max(0.0) / square).sqrt();
+    // A handful of products says nothing of their spread: no bound is better than a false one.
+    let is_handful = estimates.len() < 2 * FEWEST_PAIRS;
     Audit {
-        points: estimates.len(),
+        points,
         paths,
         error: root(squared_error),
-        // A handful of products says nothing of their spread: no bound is better than a false one.
-        upper: if estimates.len() < FEWEST_POINTS {
-            f64::INFINITY
-        } else {
-            root(squared_error.max(0.0) + ONE_SIDED_95 * noise)
-        },
-        lower: if estimates.len() < FEWEST_POINTS { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise) },
-        bias: bias / level.max(f64::MIN_POSITIVE),
-        bias_error: deviation(&shift, bias) / level.max(f64::MIN_POSITIVE),
+        upper: if is_handful { f64::INFINITY } else { root(squared_error.max(0.0) + ONE_SIDED_95 * noise) },
+        lower: if is_handful { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise) },
+        bias: mean(&|p| p.shift[0]) / level,
+        bias_error: deviation(&|p| p.shift) / level,
         mean_illuminance: level,
         compared: squares.len(),
     }
@@ -241,8 +292,8 @@ mod tests {
     #[test]
     fn few_bright_paths_prove_no_error() {
         let audit = |h: f32, bright: usize| {
-            let estimates: Vec<[f64; 2]> = (0..500).map(|i| if i < bright { [1.6, 1.6] } else { [1.0, 1.0] }).collect();
-            judge(&estimates, &vec![[h; 3]; 500], None, 1)
+            let estimates: Vec<f64> = (0..1000).map(|k| if k < 2 * bright { 1.6 } else { 1.0 }).collect();
+            judge((&estimates, 2), &[[h; 3]; 500], None, 1)
         };
         let lucky = audit(1.0, 2);
         assert!(lucky.error > 0.03 && !lucky.is_above(0.01), "{lucky:?}");

@@ -72,7 +72,8 @@ pub(super) fn truth<'a>(
     monitor.stage("referee");
     let at: Vec<Place> = places.iter().map(|station| station.place).collect();
     let mut auditor = Auditor::new(tracer, at, &engine, seed);
-    if !auditor.trace(paths, &|done| monitor.step(done, places.len())) {
+    let total = auditor.estimates();
+    if !auditor.trace(paths, &|done| monitor.step(done, total)) {
         return Err(Error::Stopped);
     }
     let element = |s: &Station| problem.elements.at(s.place.triangle, s.uv.x as f32, s.uv.y as f32, s.side);
