@@ -279,8 +279,8 @@ impl<'b, 'a> Judge<'b, 'a> {
             let light = self.at_places(&self.more, monitor)?;
             self.light = light.iter().map(|e| f64::from(luminance(*e))).collect();
         }
-        let apart = |(station, h): (&Station, &f64)| (f64::from(luminance(read(station))) - h).powi(2);
-        let squares: Vec<f64> = self.more.par_iter().zip(&self.light).map(apart).collect();
+        let apart = |(station, h): (&Station, &f64)| [(f64::from(luminance(read(station))) - h).powi(2), h * h];
+        let squares: Vec<[f64; 2]> = self.more.par_iter().zip(&self.light).map(apart).collect();
         let closely = |auditor: &Auditor| auditor.judge_read(&self.at, &read_back, &squares);
         certify(&mut self.auditor, &closely, *error, paths, stages, monitor)
     }

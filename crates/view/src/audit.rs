@@ -11,7 +11,8 @@
 //!
 //! Where light m is handed out that was read from an answer h, (m − a)(m − b) = (m − h)² + (m − h)(2h − a − b) + (h − a)(h − b), and
 //! the first part needs no referee: its mean is taken over many more places. That is where edges of shadows are, which
-//! hold most of the error on a hundredth of the area, so that K points alone bound it badly.
+//! hold most of the error on a hundredth of the area, so that K points alone bound it badly. So it is with E², which is ab − h² + h²: half of it may be on a band
+//! beside a lamp that K points miss.
 
 use crate::Referee;
 use radiosity_scene::{Bands, luminance};
@@ -183,8 +184,8 @@ impl<'a> Auditor<'a> {
     }
 
     /// Judges light `read` from an answer `h` and handed out, both at each place, by what it differs from that answer at
-    /// other places as well: `squares` are squared differences in luminance, lx², at places spread evenly by area.
-    pub fn judge_read(&self, h: &[Bands], read: &[Bands], squares: &[f64]) -> Audit {
+    /// other places as well: `squares` are squared differences in luminance, and the squared luminance of the answer, lx², at places spread evenly by area.
+    pub fn judge_read(&self, h: &[Bands], read: &[Bands], squares: &[[f64; 2]]) -> Audit {
         assert_eq!((self.places.len(), self.places.len()), (h.len(), read.len()));
         if self.paths == 0 || h.is_empty() || squares.len() < FEWEST_PAIRS {
             return self.judge(read);
@@ -202,7 +203,7 @@ fn mean_product(x: impl Iterator<Item = f64> + Clone) -> f64 {
 
 /// What estimates say of a place.
 struct Judged {
-    /// Of the square of the light.
+    /// Of the square of the light, less the part that needs no referee.
     square: f64,
     /// Of the squared error, less the part that needs no referee.
     error: f64,
@@ -215,15 +216,15 @@ struct Judged {
 }
 
 impl Judged {
-    /// By estimates of a place where light `m` is handed out that was read from `h`.
-    fn new(estimates: &[f64], m: f64, h: f64) -> Judged {
+    /// By estimates of a place where light `m` is handed out, maybe read from `h`.
+    fn new(estimates: &[f64], m: f64, h: Option<f64>) -> Judged {
         let n = estimates.len() as f64;
         let level = estimates.iter().sum::<f64>() / n;
         let spread = estimates.iter().map(|a| (a - level).powi(2)).sum::<f64>() / (n - 1.0);
         let error = mean_product(estimates.iter().map(|a| m - a));
         Judged {
-            square: mean_product(estimates.iter().copied()),
-            error: error - (m - h).powi(2),
+            square: mean_product(estimates.iter().copied()) - h.map_or(0.0, |h| h * h),
+            error: error - h.map_or(0.0, |h| (m - h).powi(2)),
             variance: 2.0 * spread * spread / (n * (n - 1.0)) + 4.0 * error.max(0.0) * spread / n,
             level,
             shift: [m - level, spread / n],
@@ -232,14 +233,14 @@ impl Judged {
 }
 
 /// Judges by so many estimates of each place: two, by what they scatter over places, or more, by what they scatter at each.
-fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands], &[f64])>, paths: u32) -> Audit {
+fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands], &[[f64; 2]])>, paths: u32) -> Audit {
     let points = m.len();
     let places: Vec<Judged> = estimates
         .chunks_exact(looks)
         .enumerate()
         .map(|(i, estimates)| {
             let m_i = f64::from(luminance(m[i]));
-            Judged::new(estimates, m_i, from.map_or(m_i, |(h, _)| f64::from(luminance(h[i]))))
+            Judged::new(estimates, m_i, from.map(|(h, _)| f64::from(luminance(h[i]))))
         })
         .collect();
     if estimates.iter().all(|a| *a == 0.0) {
@@ -258,11 +259,11 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         }
         _ => places.iter().map(|p| f(p)[1]).sum::<f64>().sqrt() / n,
     };
-    let square = mean(&|p| p.square).max(f64::MIN_POSITIVE);
     let squares = from.map_or(&[][..], |(_, squares)| squares);
     let count = squares.len() as f64;
-    let apart = squares.iter().sum::<f64>() / count.max(1.0);
-    let spread = squares.iter().map(|s| (s - apart).powi(2)).sum::<f64>() / (count * (count - 1.0)).max(1.0);
+    let [apart, known] = [0, 1].map(|k| squares.iter().map(|s| s[k]).sum::<f64>() / count.max(1.0));
+    let spread = squares.iter().map(|s| (s[0] - apart).powi(2)).sum::<f64>() / (count * (count - 1.0)).max(1.0);
+    let square = (mean(&|p| p.square) + known).max(f64::MIN_POSITIVE);
     let squared_error = mean(&|p| p.error) + apart;
     let noise = deviation(&|p| [p.error, p.variance]).hypot(spread.sqrt());
     let level = mean(&|p| p.level).max(f64::MIN_POSITIVE);

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use radiosity::transport::Shadowing;
 use radiosity::{
-    MeasureOptions, Mesh, Place, Referee, Scene, Solution, SolveOptions, Tracer, cornell_box, luminance, measure,
-    stations,
+    Material, MeasureOptions, Mesh, Place, Referee, Scene, Solution, SolveOptions, Tracer, Up, cornell_box, luminance,
+    measure, stations,
 };
 
 /// The Cornell box with so many lamps more beneath its ceiling, each an object, a pyramid of four triangles that points down. Each hangs over a
@@ -50,6 +50,55 @@ fn paths_from_nearby_find_the_light_of_all_lamps() {
             truth += f64::from(luminance(referee.irradiance(place, 4096, k)));
         }
         assert!((found / truth - 1.0).abs() < 0.01, "{count} lamps: {}", found / truth);
+    }
+}
+
+/// A room of 4 × 3 × 2.5 m whose only lamp, a strip of 1.2 m × 2 mm, lies 1 cm below the ceiling and shines up and down.
+fn beneath_a_ceiling() -> Scene {
+    let grey = |rho: f32| Material { base_color: [rho, rho, rho, 1.0], ..Material::default() };
+    let strip = Material { emissive: [5000.0; 3], double_sided: true, ..grey(0.0) };
+    let mut scene = Scene { materials: vec![grey(0.7), strip], up: Up::Z, ..Scene::default() };
+    let corner = |k: usize| DVec3::new([0.0, 4.0][k & 1], [0.0, 3.0][k >> 1 & 1], [0.0, 2.5][k >> 2]);
+    for face in [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]] {
+        scene.add_quad("room", 0, face.map(corner));
+    }
+    let strip = [[1.4, 1.499], [2.6, 1.499], [2.6, 1.501], [1.4, 1.501]].map(|[x, y]| DVec3::new(x, y, 2.49));
+    scene.add_quad("strip", 1, strip);
+    scene
+}
+
+/// Half of that strip's light falls on a band of a few centimetres, a hundredth of which most rays miss. However large the elements, they are told
+/// all of it, as each is cut into what is smooth; and gathers of a thousand rays seek the band that sends it on.
+#[test]
+fn what_lies_beside_a_lamp_has_its_light_and_is_sought() {
+    let scene = beneath_a_ceiling();
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let flux = std::f64::consts::PI * 5000.0 * 1.2 * 0.002;
+    for size in [0.3, 0.1, 0.03] {
+        let options = SolveOptions { element_size: Some(size), rays: 64, looked_up: true, ..SolveOptions::default() };
+        let solution = Solution::new(&tracer, &options, &()).unwrap();
+        let direct = solution.direct();
+        let is_ceiling = |i: &usize| solution.elements.centre(&mesh, *i as u32).z > 2.4999;
+        let received: f64 = (0..solution.elements.len())
+            .filter(is_ceiling)
+            .map(|i| f64::from(luminance(direct[i])) * solution.area[i])
+            .sum();
+        assert!((received / flux - 1.0).abs() < 2e-3, "elements of {size} m have {} of the flux", received / flux);
+        if size > 0.05 {
+            continue;
+        }
+        let places: Vec<Place> = [[2.0, 1.5], [1.0, 1.0], [3.5, 2.5], [0.5, 2.0]]
+            .map(|[x, y]| stations::snap(&tracer, DVec3::new(x, y, 0.8), DVec3::Z))
+            .to_vec();
+        let answer = solution.gathered(&places, 1024, &Shadowing { places: 1, rays: 256 }, &()).unwrap();
+        let referee = Referee::new(&tracer);
+        for (k, (place, e)) in (0..).zip(places.iter().zip(&answer.irradiance)) {
+            let truth = luminance(referee.irradiance(place, 1 << 15, k));
+            let off = luminance(*e) / truth - 1.0;
+            println!("{off}");
+            assert!(off.abs() < 0.03, "place {k} is {off} off");
+        }
     }
 }
 
