@@ -51,8 +51,9 @@ fn sobol(index: u32) -> [u32; 4] {
 
 /// A sequence of points in the unit 4-cube, fixed by its seed.
 ///
-/// Points of one index of two sequences are no points of the 8-cube: both are scrambled from the same, so that of what depends on both the mean
-/// over one pair of sequences need not come nearer to the truth with more points. One of the two has to be [`shuffled`].
+/// The first numbers of one index of two sequences are scrambled from the same, and so are the others: of what depends on both the mean
+/// over a pair of sequences may come no nearer to the truth with more points. One of the two has to be [`shuffled`], or the other's numbers
+/// be used of each.
 #[derive(Clone, Copy, Debug)]
 pub struct Sequence {
     seeds: [u32; 4],

@@ -232,12 +232,12 @@ fn elements_have_the_mean_over_their_places() {
     }
 }
 
-/// Far from lamps that nothing stands before, three places tell the mean over an element, and near them they are not trusted: not
-/// beside a plate, and not over the length of a strip, whose width is a thousandth of that: three quarters of the light 15 cm below the lamp were missed.
+/// Far from lamps that nothing stands before, three places tell the mean over an element, and near them it is cut: beside a plate, and over the length of a
+/// strip, whose width is a thousandth of that. Of three places without cuts three quarters of the light 15 cm below the lamp were missed.
 #[test]
-fn few_places_tell_the_mean_far_from_lamps_alone() {
+fn what_is_near_a_lamp_is_cut_until_few_places_tell_the_mean() {
     let [plate, strip] = [[0.1, 0.4, 0.0, 0.3], [-1.1, 8.9, 0.1, 0.11]];
-    for ([west, east, south, north], far) in [(plate, 100), (strip, 8)] {
+    for ([west, east, south, north], lit) in [(plate, 100), (strip, 10)] {
         let mut scene = lamps(1, false);
         let corners = [[west, south, 1.7], [east, south, 1.7], [east, north, 1.7], [west, north, 1.7]];
         scene.add_quad("near", 0, corners.map(DVec3::from));
@@ -249,23 +249,25 @@ fn few_places_tell_the_mean_far_from_lamps_alone() {
         let mut told = [0; 2];
         for e in 0..elements.len() as u32 {
             let (triangle, side) = elements.place(e);
-            let is_lit = side == radiosity_scene::Side::Front && columns.mean(e as usize)[1] > 0.0;
-            if !columns.is_exact(e as usize) {
-                told[0] += usize::from(is_lit && triangle >= 4);
-            } else if is_lit {
-                assert!(triangle < 2 || east > 1.0, "the plate is beside the lamp");
-                let at = |k: u32| {
-                    let uv = elements.sample(e, (f64::from(k % 80) + 0.5) / 80.0, (f64::from(k / 80) + 0.5) / 80.0);
-                    exact(&Place { point: mesh.point(triangle, uv), normal: DVec3::Z, triangle: u32::MAX }, (0.0, 0.2))
-                };
-                let (mean, found) = ((0..6400).map(at).sum::<f64>() / 6400.0, f64::from(columns.mean(e as usize)[1]));
-                // Along the strip the lamp is seen at a grazing angle, and gives a thousandth of what it gives below it.
-                let most = if triangle < 2 { 1e-3 } else { 6e-3 };
-                assert!((found - mean).abs() < most * mean, "{e}: {found} for {mean}");
-                told[1] += 1;
+            let is_beside = triangle >= 4;
+            assert!(columns.is_exact(e as usize) || !is_beside, "{e}");
+            if side == radiosity_scene::Side::Back
+                || columns.mean(e as usize)[1] <= 0.0
+                || !columns.is_exact(e as usize)
+            {
+                continue;
             }
+            let at = |k: u32| {
+                let uv = elements.sample(e, (f64::from(k % 80) + 0.5) / 80.0, (f64::from(k / 80) + 0.5) / 80.0);
+                exact(&Place { point: mesh.point(triangle, uv), normal: DVec3::Z, triangle: u32::MAX }, (0.0, 0.2))
+            };
+            let (mean, found) = ((0..6400).map(at).sum::<f64>() / 6400.0, f64::from(columns.mean(e as usize)[1]));
+            // Along the strip the lamp is seen at a grazing angle, and gives a thousandth of what it gives below it.
+            let most = if is_beside { 6e-3 } else { 1e-4 };
+            assert!((found - mean).abs() < most * mean, "{e}: {found} for {mean}");
+            told[usize::from(is_beside)] += 1;
         }
-        assert!(told[0] >= 2 && told[1] > far, "{told:?}");
+        assert!(told[0] > lit && told[1] >= 2, "{told:?}");
     }
 }
 
