@@ -177,7 +177,7 @@ impl Sights {
     }
 }
 
-/// Whether what panels give is smooth over a part of a site with so large a normal: all that give it light are far from it.
+/// Whether what panels give is smooth over a part of a site with such a normal: all that give it light are far from it.
 pub(crate) fn is_smooth<'p>(panels: impl IntoIterator<Item = &'p Panel>, part: [DVec3; 3], normal: DVec3) -> bool {
     let [a, b, c] = part;
     let (centre, longest) = ((a + b + c) / 3.0, a.distance(b).max(b.distance(c)).max(c.distance(a)));
