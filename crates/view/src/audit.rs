@@ -207,8 +207,8 @@ struct Judged {
     square: f64,
     /// Of the squared error, less the part that needs no referee.
     error: f64,
-    /// The variance of that, by the estimates.
-    variance: f64,
+    /// The variance of that by the estimates, if there were no error.
+    noise: f64,
     /// Of the light itself.
     level: f64,
     /// Of the error, and its variance.
@@ -221,14 +221,33 @@ impl Judged {
         let n = estimates.len() as f64;
         let level = estimates.iter().sum::<f64>() / n;
         let spread = estimates.iter().map(|a| (a - level).powi(2)).sum::<f64>() / (n - 1.0);
-        let error = mean_product(estimates.iter().map(|a| m - a));
         Judged {
             square: mean_product(estimates.iter().copied()) - h.map_or(0.0, |h| h * h),
-            error: error - h.map_or(0.0, |h| (m - h).powi(2)),
-            variance: 2.0 * spread * spread / (n * (n - 1.0)) + 4.0 * error.max(0.0) * spread / n,
+            error: mean_product(estimates.iter().map(|a| m - a)) - h.map_or(0.0, |h| (m - h).powi(2)),
+            noise: 2.0 * spread * spread / (n * (n - 1.0)),
             level,
             shift: [m - level, spread / n],
         }
+    }
+}
+
+/// Variance of an estimate of a squared error x: so much, and so much for each unit of x.
+#[derive(Clone, Copy)]
+struct Noise {
+    fixed: f64,
+    growing: f64,
+}
+
+impl Noise {
+    fn at(&self, square: f64) -> f64 {
+        (self.fixed + self.growing * square.max(0.0)).sqrt()
+    }
+
+    /// The x that is so far above its estimate, in standard errors of an estimate of x itself (Wilson 1927): where there may be no error at all, what is
+    /// estimated says least of how far off it is.
+    fn bound(&self, estimate: f64) -> f64 {
+        let (estimate, half) = (estimate.max(0.0), 0.5 * ONE_SIDED_95.powi(2) * self.growing);
+        estimate + half + half.hypot(ONE_SIDED_95 * self.at(estimate))
     }
 }
 
@@ -251,13 +270,16 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
     }
     let n = points as f64;
     let mean = |f: &dyn Fn(&Judged) -> f64| places.iter().map(f).sum::<f64>() / n.max(1.0);
-    // Of a mean over places, what each is and the variance of that.
-    let deviation = |f: &dyn Fn(&Judged) -> [f64; 2]| match looks {
-        2 => {
-            let mean = mean(&|p| f(p)[0]);
-            (places.iter().map(|p| (f(p)[0] - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
-        }
-        _ => places.iter().map(|p| f(p)[1]).sum::<f64>().sqrt() / n,
+    let over_places = |f: &dyn Fn(&Judged) -> f64| {
+        let mean = mean(f);
+        places.iter().map(|p| (f(p) - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)
+    };
+    let (mut noise, shifted) = if looks == 2 {
+        (Noise { fixed: over_places(&|p| p.error), growing: 0.0 }, over_places(&|p| p.shift[0]))
+    } else {
+        // As much as if all of the error were at the place that is known worst.
+        let growing = 4.0 * places.iter().map(|p| p.shift[1]).fold(0.0, f64::max) / n;
+        (Noise { fixed: mean(&|p| p.noise) / n, growing }, mean(&|p| p.shift[1]) / n)
     };
     let squares = from.map_or(&[][..], |(_, squares)| squares);
     let count = squares.len() as f64;
@@ -265,7 +287,7 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
     let spread = squares.iter().map(|s| (s[0] - apart).powi(2)).sum::<f64>() / (count * (count - 1.0)).max(1.0);
     let square = (mean(&|p| p.square) + known).max(f64::MIN_POSITIVE);
     let squared_error = mean(&|p| p.error) + apart;
-    let noise = deviation(&|p| [p.error, p.variance]).hypot(spread.sqrt());
+    noise.fixed += spread;
     let level = mean(&|p| p.level).max(f64::MIN_POSITIVE);
     let root = |x: f64| (x.max(0.0) / square).sqrt();
     // A handful of products says nothing of their spread: no bound is better than a false one.
@@ -274,10 +296,10 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         points,
         paths,
         error: root(squared_error),
-        upper: if is_handful { f64::INFINITY } else { root(squared_error.max(0.0) + ONE_SIDED_95 * noise) },
-        lower: if is_handful { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise) },
+        upper: if is_handful { f64::INFINITY } else { root(noise.bound(squared_error)) },
+        lower: if is_handful { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise.at(squared_error)) },
         bias: mean(&|p| p.shift[0]) / level,
-        bias_error: deviation(&|p| p.shift) / level,
+        bias_error: shifted.sqrt() / level,
         mean_illuminance: level,
         compared: squares.len(),
     }
@@ -288,6 +310,7 @@ mod tests {
     use super::*;
     use glam::DVec3;
     use radiosity_scene::{Material, Mesh, Scene};
+    use radiosity_trace::sampling::Random;
 
     /// A few bright paths of the referee are no proof that an answer is wrong; that all places say so is.
     #[test]
@@ -300,6 +323,30 @@ mod tests {
         assert!(lucky.error > 0.03 && !lucky.is_above(0.01), "{lucky:?}");
         let wrong = audit(1.03, 0);
         assert!((wrong.error - 0.03).abs() < 1e-6 && wrong.is_above(0.01), "{wrong:?}");
+    }
+
+    /// Of few points that are looked at often the bound is above the error in 95 % of cases at least, however large that is and wherever: less three
+    /// standard errors of what is counted, 0.5 % each.
+    #[test]
+    fn bounds_of_few_points_hold() {
+        let mut random = Random::new(7);
+        let mut normal = || (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
+        const NOISE: f64 = 0.3;
+        for (points, looks) in [(1usize, 128usize), (4, 32), (20, 8), (50, 4)] {
+            for (share, is_one) in [0.0, 1.0, 1.7, 2.5, 3.5, 8.0].into_iter().flat_map(|d| [(d, false), (d, true)]) {
+                // In standard errors of the mean of all estimates of a place; at one of them, or at all.
+                let off = share * NOISE / (looks as f64).sqrt();
+                let m: Vec<Bands> =
+                    (0..points).map(|k| [1.0 + if is_one && k > 0 { 0.0 } else { off as f32 }; 3]).collect();
+                let error = if is_one { off / (points as f64).sqrt() } else { off };
+                let holds = |_: &u32| {
+                    let estimates: Vec<f64> = (0..points * looks).map(|_| 1.0 + NOISE * normal()).collect();
+                    judge((&estimates, looks), &m, None, 1).upper >= error
+                };
+                let held = (0..2000u32).filter(holds).count();
+                assert!(held >= 1870, "{points} points, {share} off, at one: {is_one}: {held} of 2,000");
+            }
+        }
     }
 
     /// As many more paths as bring the bound to the target by what is known, half as many at least, and twice as many where nothing would.
