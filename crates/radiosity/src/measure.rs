@@ -428,7 +428,8 @@ pub(crate) fn most_paths(error: f64) -> u32 {
     rays_for(error, 4096.0, 64, 1 << 16) as u32
 }
 
-/// Paths per estimate that every audit begins with.
+/// Paths per estimate that every audit begins with: about as sure as 64 before paths began at lamps, too. With 40 the box at 1 % takes a tenth less time than
+/// with 64, the office as long.
 pub(crate) const FIRST_PATHS: u32 = 48;
 
 /// Paths of the referee, over all estimates, before a miss is believed: a few thousand, and what one bright path in them

@@ -370,9 +370,9 @@ impl Luminaires {
         *is_whole = site.point().is_some();
         let is_smooth = |part| is_smooth(self.panels.iter().flatten(), part, site.normal);
         // Next to a lamp it is worth a look however few rays there would be: some such elements may send half of the light.
-        let worth = |part| if is_smooth(part) { rays } else { u32::MAX };
-        let part = site.part().filter(|_| is_mean);
-        if part.is_some_and(|part| sights.are_clear(self, tracer, worth(part))) {
+        let mut is_clear =
+            |part| sights.are_clear(self, tracer, rays) || !is_smooth(part) && sights.are_clear(self, tracer, u32::MAX);
+        if is_mean && site.part().is_some_and(&mut is_clear) {
             *is_whole = true;
             site.cubature(is_smooth, nodes);
         } else {

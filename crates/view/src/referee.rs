@@ -101,8 +101,7 @@ impl<'a> Referee<'a> {
                 if side == Side::Back && !material.has_two_sides() {
                     continue;
                 }
-                let sign = if side == Side::Front { 1.0 } else { -1.0 };
-                let normal = sign * mesh.normal(t);
+                let normal = outward(mesh.normal(t), side);
                 boxes.push(Emitter::triangle(mesh.corners(t), normal, area * density));
                 emitters.push(Source { triangle: t as u32, normal, area, density });
                 sum += area * density;
