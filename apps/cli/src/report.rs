@@ -87,7 +87,7 @@ pub struct ErrorReport {
     pub bias_standard_error: f64,
     /// Points that the audit looked at.
     pub points: usize,
-    /// Paths per estimate where light is as bright as on average, two estimates per point.
+    /// Paths per estimate where light is as bright as on average, two estimates per point, more where `measure` has few.
     pub paths_per_estimate: u32,
     /// Mean illuminance at the points by the referee, lx.
     pub mean_illuminance: f64,
