@@ -180,7 +180,8 @@ impl std::fmt::Display for Round {
 pub struct Measurement {
     /// Irradiance, lux per band.
     pub irradiance: Vec<Bands>,
-    /// What the referee says.
+    /// What the referee says of it. Where no round met what is asked this is the one with the lowest upper bound, which need not be the last of
+    /// [`Measurement::rounds`].
     pub audit: Audit,
     /// Whether the audit's upper bound meets the asked error.
     pub achieved: bool,
@@ -279,9 +280,9 @@ pub fn measure(
             residual: solution.info.residual.clone(),
             bound: solution.info.bound.clone(),
         };
-        // A time limit may have left too little for the points of another solution.
+        // A finer solution need not be a better one, and a time limit may have left too little for its points.
         let answer = match best.take() {
-            Some(best) if monitor.deadline().is_some() && best.audit.upper < answer.audit.upper => best,
+            Some(best) if best.audit.upper < answer.audit.upper => best,
             _ => answer,
         };
         let alone = options.solve.element_size.is_some() || solved % 2 == 1;
