@@ -197,6 +197,13 @@ pub struct Measurement {
     pub bound: Vec<f64>,
 }
 
+impl Measurement {
+    /// The answer of an earlier round, where that has the lower bound.
+    fn or_better(self, before: Option<Measurement>) -> Measurement {
+        before.filter(|before| before.audit.upper < self.audit.upper).unwrap_or(self)
+    }
+}
+
 /// `base` at 1 %, growing with the accuracy asked as stratified sampling needs (error ∝ M^−0.7), as a power of two.
 pub(crate) fn rays_for(error: f64, base: f64, least: usize, most: usize) -> usize {
     let wanted = (base * (0.01 / error).powf(1.4)).clamp(least as f64, most as f64) as usize;
@@ -281,10 +288,7 @@ pub fn measure(
             bound: solution.info.bound.clone(),
         };
         // A finer solution need not be a better one, and a time limit may have left too little for its points.
-        let answer = match best.take() {
-            Some(best) if best.audit.upper < answer.audit.upper => best,
-            _ => answer,
-        };
+        let answer = answer.or_better(best.take());
         let alone = options.solve.element_size.is_some() || solved % 2 == 1;
         let next = if plan.solves_again { finer(&solve, solution.rays(), alone) } else { solve };
         let is_last = answer.achieved
@@ -506,5 +510,22 @@ mod tests {
         assert!(plan.solves_again && plan.noise <= NOISE * 0.01 && plan.noise >= LEAST_PART * AIM * 0.01, "{plan:?}");
         // An estimate below the noise is no error of the solution.
         assert!(!Plan::after(0.0, 0.005, 0.01).solves_again);
+    }
+
+    #[test]
+    fn of_rounds_the_one_with_the_lowest_bound_answers() {
+        let with = |upper: f64| Measurement {
+            irradiance: vec![[upper as f32; 3]],
+            audit: Audit { upper, ..Audit::default() },
+            achieved: false,
+            out_of_time: false,
+            rounds: Vec::new(),
+            stages: Stages::default(),
+            residual: Vec::new(),
+            bound: Vec::new(),
+        };
+        let answer = [0.015, 0.0032, 0.0065].map(with).into_iter().fold(None, |best, next| Some(next.or_better(best)));
+        let answer = answer.unwrap();
+        assert!(answer.audit.upper == 0.0032 && answer.irradiance == [[0.0032; 3]], "{answer:?}");
     }
 }
