@@ -11,11 +11,13 @@
 use crate::eclipse::{Sights, is_smooth};
 use crate::one_light::{CHANCE, DARK, LIT, SAMPLED, luminance_of};
 use crate::parts::Parts;
+use crate::receivers::QUARTERED;
 use crate::{Luminaires, Progress, Receivers, Stopped};
 use radiosity_scene::Bands;
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use radiosity_trace::{Place, Tracer};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rays from which on the visible share is a ratio of sums: noise-free in full light, and biased by O(1/rays) of how
@@ -55,6 +57,14 @@ pub struct Columns {
     lights: usize,
     seen: Vec<Bands>,
     all: Vec<Column>,
+}
+
+/// What is asked of the places of a receiver.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    Mean,
+    /// How light varies; the mean as well next to lamps.
+    Variation,
 }
 
 /// What is told of one receiver.
@@ -98,12 +108,15 @@ fn add_up(values: &[Bands]) -> Bands {
 }
 
 /// How direct illuminance is spread over a receiver.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Variation {
     /// Mean, lx.
     pub mean: f32,
-    /// Variance over places, lx².
-    pub variance: f32,
+    /// Standard deviation over places, lx.
+    pub deviation: f32,
+    /// Of a receiver next to a lamp, the mean of the deviations within its parts when it is quartered once, twice and so on, lx;
+    /// none where only a few places were looked at.
+    pub within: Option<Box<[f32; QUARTERED]>>,
 }
 
 /// A place of a receiver.
@@ -223,7 +236,7 @@ impl Luminaires {
                 at.clear();
                 weights.clear();
                 lit.clear();
-                self.go_to((tracer, receivers), (i, receivers.seed(i)), (shadowing, true), &mut scratch);
+                self.go_to((tracer, receivers), (i, receivers.seed(i)), (shadowing, Asked::Mean), &mut scratch);
                 scratch.look(tracer, receivers, (i, 0), shadowing.rays, |_, spot, visible| {
                     at.push(spot.place);
                     weights.push(spot.weight);
@@ -266,8 +279,8 @@ impl Luminaires {
         (columns, reached)
     }
 
-    /// Mean and variance of the direct illuminance over each receiver. The variance is that over places, without that
-    /// of the shadow rays, since it is the covariance of two independent estimates at the same places.
+    /// Mean and deviation of the direct illuminance over each receiver. The deviation is that over places, without that
+    /// of the shadow rays, since its square is the covariance of two independent estimates at the same places.
     ///
     /// # Errors
     /// [`Stopped`] if `progress` says so.
@@ -289,7 +302,18 @@ impl Luminaires {
             for (k, out) in out.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
                 let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
-                self.go_to((tracer, receivers), (i, hash(receivers.seed(i))), (shadowing, false), &mut scratch);
+                self.go_to(
+                    (tracer, receivers),
+                    (i, hash(receivers.seed(i))),
+                    (shadowing, Asked::Variation),
+                    &mut scratch,
+                );
+                if scratch.is_whole {
+                    if !scratch.spots.is_empty() {
+                        *out = scratch.quartered();
+                    }
+                    continue;
+                }
                 for set in 1..3 {
                     scratch.look(tracer, receivers, (i, set), shadowing.rays, |index, _, visible| {
                         let sum = visible.iter().map(|e| luminance_of(*e)).sum::<f64>();
@@ -311,7 +335,7 @@ impl Luminaires {
                 let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
                 let covariance: f64 = pairs.iter().map(|(x, y)| (x - a) * (y - b)).sum();
                 out.mean = (0.5 * (a + b)) as f32;
-                out.variance = (covariance / (n - 1.0)).max(0.0) as f32;
+                out.deviation = (covariance / (n - 1.0)).max(0.0).sqrt() as f32;
             }
             progress.step(done.fetch_add(out.len(), Ordering::Relaxed) + out.len(), n).then_some(()).ok_or(Stopped)
         })?;
@@ -355,7 +379,7 @@ impl Luminaires {
         &'l self,
         (tracer, receivers): (&Tracer, &impl Receivers),
         (i, seed): (usize, u32),
-        (shadowing, is_mean): (&Shadowing, bool),
+        (shadowing, asked): (&Shadowing, Asked),
         Scratch { spots, nodes, parts, sights, exact, is_whole, .. }: &mut Scratch<'l>,
     ) {
         spots.clear();
@@ -369,10 +393,10 @@ impl Luminaires {
         nodes.clear();
         *is_whole = site.point().is_some();
         let is_smooth = |part| is_smooth(self.panels.iter().flatten(), part, site.normal);
+        let mut is_clear = |rays| sights.are_clear(self, tracer, rays);
         // Next to a lamp it is worth a look however few rays there would be: some such elements may send half of the light.
-        let mut is_clear =
-            |part| sights.are_clear(self, tracer, rays) || !is_smooth(part) && sights.are_clear(self, tracer, u32::MAX);
-        if is_mean && site.part().is_some_and(&mut is_clear) {
+        let mut is_told = |part| asked == Asked::Mean && is_clear(rays) || !is_smooth(part) && is_clear(u32::MAX);
+        if site.part().is_some_and(&mut is_told) {
             *is_whole = true;
             site.cubature(is_smooth, nodes);
         } else {
@@ -394,6 +418,34 @@ impl Luminaires {
             });
             spots.push(Spot { place, weight: *weight, offset, settled, outcome: 0, is_buried: None });
         }
+    }
+}
+
+/// How light is spread over a part of a receiver.
+#[derive(Clone, Copy)]
+struct Moments {
+    /// Its share of the receiver.
+    weight: f64,
+    /// Mean over it, lx, and mean square.
+    mean: f64,
+    square: f64,
+}
+
+impl Moments {
+    fn of(parts: &[Moments]) -> Moments {
+        let weight = parts.iter().map(|part| part.weight).sum();
+        let mean_of = |f: fn(&Moments) -> f64| parts.iter().map(|part| part.weight * f(part)).sum::<f64>() / weight;
+        Moments { weight, mean: mean_of(|part| part.mean), square: mean_of(|part| part.square) }
+    }
+
+    /// How often the receiver was quartered.
+    fn level(&self) -> usize {
+        (-self.weight.log2() / 2.0).round() as usize
+    }
+
+    /// Its part of the mean deviation.
+    fn astray(&self) -> f64 {
+        self.weight * (self.square - self.mean * self.mean).max(0.0).sqrt()
     }
 }
 
@@ -439,6 +491,34 @@ impl Scratch<'_> {
                 visit(index, spot, &self.visible[index * lights..][..lights]);
             }
         }
+    }
+
+    /// How light is spread over a receiver whose places are those of a cubature at which all light is known: by the parts that
+    /// these make up, three each.
+    fn quartered(&self) -> Variation {
+        let lights = self.used.len();
+        let lux: Vec<f64> = self.exact.chunks(lights).map(|e| e.iter().map(|e| luminance_of(*e)).sum()).collect();
+        let mut within = [0.0; QUARTERED + 1];
+        let mut parts: SmallVec<[Moments; 3 * QUARTERED + 4]> = SmallVec::new();
+        for (spots, lux) in self.spots.chunks(3).zip(lux.chunks(3)) {
+            let weight = spots.iter().map(|spot| spot.weight).sum();
+            let mean_of = |f: fn(f64) -> f64| lux.iter().map(|lux| f(*lux)).sum::<f64>() / lux.len() as f64;
+            let mut part = Moments { weight, mean: mean_of(|lux| lux), square: mean_of(|lux| lux * lux) };
+            // Where light is smooth it varies half as much over half the length.
+            let level = part.level();
+            (level..=QUARTERED).for_each(|k| within[k] += part.astray() * 0.5f64.powi((k - level) as i32));
+            // Four in a row that are as large are the quarters of one.
+            while let Some(first) = parts.len().checked_sub(3).filter(|first| parts[*first].level() == part.level()) {
+                parts.push(part);
+                part = Moments::of(&parts[first..]);
+                parts.truncate(first);
+                within[part.level()] += part.astray();
+            }
+            parts.push(part);
+        }
+        let [deviation, within @ ..] = within.map(|lux| lux as f32);
+        let mean = parts.first().map_or(0.0, |whole| whole.mean as f32);
+        Variation { mean, deviation, within: Some(Box::new(within)) }
     }
 
     /// Most parts at any of the places.

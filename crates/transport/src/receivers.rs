@@ -21,7 +21,7 @@ const LEAST: u32 = 8;
 
 /// How often an element is quartered next to a lamp, at most: into parts a thirty-second as long. Those of 30 cm have all the light of a strip 1 cm away; what is
 /// much nearer keeps an error that no rays mend.
-const QUARTERED: i32 = 5;
+pub const QUARTERED: usize = 5;
 
 /// Where a receiver lies: all that its places need, worked out once.
 #[derive(Clone, Copy, Debug)]
@@ -91,14 +91,14 @@ impl Site {
     /// smooth, to the second degree. Other parts are quartered, a few times at most.
     pub(crate) fn cubature(&self, is_smooth: impl Fn([DVec3; 3]) -> bool, nodes: &mut Vec<(Place, f64)>) {
         let Site { origin, edges: [along, across], normal, triangle, .. } = *self;
-        let mut parts = vec![([origin, origin + along, origin + across], 0)];
+        let mut parts = vec![([origin, origin + along, origin + across], 0usize)];
         while let Some(([a, b, c], depth)) = parts.pop() {
             if depth < QUARTERED && !is_smooth([a, b, c]) {
                 let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(from, to)| 0.5 * (from + to));
                 parts.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]].map(|part| (part, depth + 1)));
                 continue;
             }
-            let weight = 0.25f64.powi(depth) / 3.0;
+            let weight = 0.25f64.powi(depth as i32) / 3.0;
             let at = |point| (Place { point, normal, triangle }, weight);
             nodes.extend([(a, b, c), (b, c, a), (c, a, b)].map(|(near, p, q)| at((4.0 * near + p + q) / 6.0)));
         }

@@ -100,18 +100,16 @@ impl<'a> Solution<'a> {
         if needed > options.memory {
             return Err(memory_error(tracer, Elements::count(scene, mesh, element_size), needed, options));
         }
-        let needed = |elements: &Elements| {
-            let solution = footprint::solution(tracer, elements.len(), Luminaires::most(scene));
-            solution.saturating_add(options.stored(elements.cells()))
-        };
+        let lights = Luminaires::most(scene);
         let begin = |elements: usize| Begin { monitor, is_soon: elements <= FEW };
         let elements = stages.time(monitor, "elements", || {
             let cells = Elements::new(scene, mesh, element_size);
             let cells = if options.looked_up { cells.shared(element_size) } else { cells };
-            match divided(tracer, &cells, options.variation, &begin(cells.len())) {
+            // Coarser light, where there is no room for finer.
+            let room = options.memory.saturating_sub(options.stored(cells.cells()));
+            let most = footprint::most_elements(tracer, room, lights);
+            match divided(tracer, &cells, options.variation, most, &begin(cells.len())) {
                 Err(_) if is_over(monitor) => Ok(cells),
-                // Coarser light, where there is no room for finer.
-                Ok(fine) if needed(&fine) > options.memory && needed(&cells) <= options.memory => Ok(cells),
                 done => done,
             }
         })?;
@@ -127,7 +125,8 @@ impl<'a> Solution<'a> {
         })?;
         let sheets = sheets.exposed(&exposure);
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
-        let needed = needed(&elements);
+        let needed =
+            footprint::solution(tracer, elements.len(), lights).saturating_add(options.stored(elements.cells()));
         if needed > options.memory {
             return Err(memory_error(tracer, elements.len(), needed, options));
         }

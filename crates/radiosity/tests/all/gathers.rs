@@ -25,15 +25,21 @@ fn with_lamps(count: usize) -> Scene {
 }
 
 /// Of few lamps each spot looks at one that is picked at a glance, of many at one by what elements received. Elements are so large that most
-/// of what is hit is near, and half of that goes on as paths: the mean light of points is that of the path tracer, up to a hundredth. It is within 0.5 % here, and 4 % off where
-/// the probability of either way is left out. Far elements are few and small, hence their many rays: with 16 the mean is 2 % off whichever way.
+/// of what is hit is near, and half of that goes on as paths: the mean light of points is that of the path tracer. It is within 0.5 % here, and where the probability
+/// of a glance is left out 6 % off, and 1.1 % where that of an element's is, by which only differences are divided. Far elements are few and small, hence their many rays: with 16 the mean is 2 % off whichever way.
 #[test]
 fn paths_from_nearby_find_the_light_of_all_lamps() {
     for count in [3, 20] {
         let scene = with_lamps(count);
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let options = SolveOptions { element_size: Some(0.3), rays: 1024, looked_up: true, ..SolveOptions::default() };
+        let options = SolveOptions {
+            element_size: Some(0.2),
+            variation: f64::INFINITY,
+            rays: 1024,
+            looked_up: true,
+            ..SolveOptions::default()
+        };
         let solution = Solution::new(&tracer, &options, &()).unwrap();
         assert_eq!(solution.luminaires.lights.len(), count + 1);
         let places: Vec<Place> = (0..64)
@@ -49,7 +55,7 @@ fn paths_from_nearby_find_the_light_of_all_lamps() {
             found += f64::from(luminance(*e));
             truth += f64::from(luminance(referee.irradiance(place, 4096, k)));
         }
-        assert!((found / truth - 1.0).abs() < 0.01, "{count} lamps: {}", found / truth);
+        assert!((found / truth - 1.0).abs() < 0.008, "{count} lamps: {}", found / truth);
     }
 }
 
@@ -99,6 +105,20 @@ fn what_lies_beside_a_lamp_has_its_light_and_is_sought() {
             assert!(off.abs() < 0.03, "place {k} is {off} off");
         }
     }
+}
+
+/// The elements beside the strip are as small as the band that it lights: without that four rounds came no nearer than 0.46 %, and answers
+/// were too bright.
+#[test]
+fn a_room_with_a_lamp_beside_its_ceiling_takes_few_rounds() {
+    let scene = beneath_a_ceiling();
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let places = [[2.0, 1.5, 0.0], [1.0, 1.0, 0.8], [3.5, 2.5, 0.8]].map(DVec3::from_array);
+    let points: Vec<(DVec3, DVec3)> = places.into_iter().map(|place| (place, DVec3::Z)).collect();
+    let options = MeasureOptions { error: 0.003, ..MeasureOptions::default() };
+    let measured = measure(&tracer, &points, &options, &()).unwrap();
+    assert!(measured.achieved && measured.rounds.len() <= 2, "{:?}", measured.rounds);
 }
 
 /// Where points are many they share what they gather, and a few rays each do: the first 2,000 of 20,000 in the Cornell box are still as

@@ -298,6 +298,56 @@ fn triangles_hide_what_lies_below_them() {
     }
 }
 
+/// Below a ceiling a strip lights a band a few centimetres wide: by how much light varies within elements is known for all the parts they
+/// may be cut into, to a twentieth.
+#[test]
+fn how_light_varies_beside_a_lamp_is_known_at_each_quartering() {
+    const FINEST: usize = 8;
+    let lamp = Material { emissive: [1000.0; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
+    let mut scene = Scene { materials: vec![Material::default(), lamp], ..Scene::default() };
+    let square = |side: f64| [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]].map(|[x, y]| DVec3::new(x, y, 0.0));
+    scene.add_quad("ceiling", 0, square(1.2));
+    let strip = [[0.25, 0.6], [0.25, 0.602], [0.95, 0.602], [0.95, 0.6]].map(|[x, y]| DVec3::new(x, y, 0.01));
+    scene.add_quad("strip", 1, strip);
+    let (mesh, elements, area, luminaires) = prepared(&scene, 0.3);
+    let (tracer, exposure) = (Tracer::new(&scene, &mesh), crate::Exposure::default());
+    let receivers = crate::ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+    let told = luminaires.variation(&tracer, &receivers, &Shadowing { places: 4, rays: 4 }, &()).unwrap();
+
+    // Mean and mean square over a part, with what each of its own parts adds to the mean deviations.
+    fn moments(e: &impl Fn(DVec3) -> f64, [a, b, c]: [DVec3; 3], level: usize, within: &mut [f64]) -> [f64; 2] {
+        if level == FINEST {
+            let e = e((a + b + c) / 3.0);
+            return [e, e * e];
+        }
+        let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(from, to)| 0.5 * (from + to));
+        let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]];
+        let all = quarters.map(|part| moments(e, part, level + 1, within));
+        let [mean, square] = [0, 1].map(|k| all.iter().map(|part| part[k]).sum::<f64>() / 4.0);
+        within[level] += (square - mean * mean).max(0.0).sqrt() * 0.25f64.powi(level as i32);
+        [mean, square]
+    }
+    let e = |point: DVec3| 1000.0 * PI * crate::polygon::point_to_polygon(point, DVec3::Z, &strip);
+    let (mut truth, mut found, mut beside) = ([0.0; QUARTERED + 1], [0.0; QUARTERED + 1], 0);
+    for (i, told) in told.iter().enumerate() {
+        let Some(within) = &told.within else { continue };
+        let mut own = [0.0; FINEST];
+        let [mean, _] = moments(&e, receivers.site(i).unwrap().part().unwrap(), 0, &mut own);
+        assert!((f64::from(told.mean) - mean).abs() < 0.01 * mean, "{i}: {} for {mean}", told.mean);
+        let levels = std::iter::once(told.deviation).chain(**within);
+        for (level, deviation) in levels.enumerate() {
+            truth[level] += area[i] * own[level];
+            found[level] += area[i] * f64::from(deviation);
+        }
+        beside += 1;
+    }
+    assert!(beside > 10, "{beside}");
+    for (level, (found, truth)) in found.iter().zip(&truth).enumerate() {
+        assert!((found / truth - 1.0).abs() < 0.05, "{level}: {found} for {truth}");
+    }
+    assert!(found[QUARTERED] < 0.1 * found[0], "{found:?}");
+}
+
 /// Of a lamp that is seen through a hole alone, each place sees a hundredth or less: what lies inside a solid is no part of the mean all the same.
 #[test]
 fn buried_places_do_not_count_where_others_glimpse_light() {
