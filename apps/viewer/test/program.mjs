@@ -248,7 +248,22 @@ export async function compared(page, count = 150) {
   // Floor under things gets no light at all and is not seen.
   const pairs = shown.map((lux, i) => [lux, truth[i]]).filter(([lux, true_lux]) => lux !== null && true_lux > 0);
   if (pairs.length < 0.9 * count) throw new Error(`${pairs.length} of ${count} points were found on the page`);
-  return difference(pairs.map(([lux]) => lux), pairs.map(([, lux]) => lux));
+  const off = difference(pairs.map(([lux]) => lux), pairs.map(([, lux]) => lux));
+  if (off >= NEAR) await explain(page, points, shown, truth);
+  return off;
+}
+
+/** Says where the page is farthest from a batch solve, whether it still is after a while, and whether another batch solve says so, too. */
+async function explain(page, points, shown, truth) {
+  await page.waitForTimeout(2000);
+  const later = await page.evaluate((points) => points.map((point) => window.radiosity.lux(point)), points);
+  const again = await measured(page, points);
+  const { status, objects } = await state(page);
+  console.log(`far from a batch solve; ${JSON.stringify(status)}`);
+  const off = (i) => Math.abs((shown[i] ?? truth[i]) - truth[i]);
+  const worst = points.map((_, i) => i).sort((a, b) => off(b) - off(a)).slice(0, 10);
+  for (const i of worst) console.log(`at ${points[i]}: shown ${shown[i]}, later ${later[i]}; batch ${truth[i]}, again ${again[i]} lx`);
+  for (const { name, matrix, deleted } of objects) console.log(`${deleted ? 'deleted ' : ''}${name}: ${matrix}`);
 }
 
 /** A page that never reads what it is sent, and asks for all light again and again, some 30 MB of it: more than the buffers

@@ -232,6 +232,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                         monitor.warn(&format!("{error}; the answer is that of the rounds before"));
                         ends = true;
                     }
+                    // How much room elements take was known once they were made.
+                    Err(Error::Memory { .. }) => ends = true,
                     done => done?,
                 }
             } else {

@@ -36,11 +36,6 @@ pub(crate) fn solution(tracer: &Tracer, elements: usize, lights: usize) -> usize
     held(tracer).saturating_add(elements.saturating_mul(of_element(lights)))
 }
 
-/// How many elements a solution may have that takes so many bytes, with its scene.
-pub(crate) fn most_elements(tracer: &Tracer, bytes: usize, lights: usize) -> usize {
-    bytes.saturating_sub(held(tracer)) / of_element(lights)
-}
-
 /// The smallest limit of memory within which light can be found in a scene: what it takes to weld it, to build its tree, or to solve
 /// for one element on each side that has any. Told from counts, before any of that is taken.
 pub fn least_memory(scene: &Scene) -> usize {

@@ -63,7 +63,7 @@ pub struct Columns {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Asked {
     Mean,
-    /// How light varies; the mean as well next to lamps.
+    /// How light varies, at a few places; exactly next to lamps.
     Variation,
 }
 
@@ -116,7 +116,7 @@ pub struct Variation {
     pub deviation: f32,
     /// Of a receiver next to a lamp, the mean of the deviations within its parts when it is quartered once, twice and so on, lx;
     /// none where only a few places were looked at.
-    pub within: Option<Box<[f32; QUARTERED]>>,
+    pub within: Option<[f32; QUARTERED]>,
 }
 
 /// A place of a receiver.
@@ -152,6 +152,8 @@ struct Scratch<'l> {
     outcomes: u8,
     /// Whether its places tell all there is of it.
     is_whole: bool,
+    /// Whether they are those of a cubature, at which all light is known.
+    is_told: bool,
     /// Rays of a light from which on its visible share is a ratio.
     ratio: u32,
 }
@@ -301,19 +303,17 @@ impl Luminaires {
             let mut scratch = self.scratch(1);
             for (k, out) in out.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
-                let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
                 self.go_to(
                     (tracer, receivers),
                     (i, hash(receivers.seed(i))),
                     (shadowing, Asked::Variation),
                     &mut scratch,
                 );
-                if scratch.is_whole {
-                    if !scratch.spots.is_empty() {
-                        *out = scratch.quartered();
-                    }
+                if scratch.is_told {
+                    *out = scratch.quartered();
                     continue;
                 }
+                let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
                 for set in 1..3 {
                     scratch.look(tracer, receivers, (i, set), shadowing.rays, |index, _, visible| {
                         let sum = visible.iter().map(|e| luminance_of(*e)).sum::<f64>();
@@ -370,6 +370,7 @@ impl Luminaires {
             visible: Vec::new(),
             outcomes: 0,
             is_whole: true,
+            is_told: false,
             ratio,
         }
     }
@@ -380,11 +381,11 @@ impl Luminaires {
         (tracer, receivers): (&Tracer, &impl Receivers),
         (i, seed): (usize, u32),
         (shadowing, asked): (&Shadowing, Asked),
-        Scratch { spots, nodes, parts, sights, exact, is_whole, .. }: &mut Scratch<'l>,
+        Scratch { spots, nodes, parts, sights, exact, is_whole, is_told, .. }: &mut Scratch<'l>,
     ) {
         spots.clear();
         exact.clear();
-        *is_whole = true;
+        (*is_whole, *is_told) = (true, false);
         let Some(site) = receivers.site(i) else { return };
         // Where rays would be fewer, as nothing was found to be in the way, there is little to cut.
         let (rays, count) = (shadowing.rays, receivers.places(i, shadowing.places));
@@ -394,10 +395,13 @@ impl Luminaires {
         *is_whole = site.point().is_some();
         let is_smooth = |part| is_smooth(self.panels.iter().flatten(), part, site.normal);
         let mut is_clear = |rays| sights.are_clear(self, tracer, rays);
-        // Next to a lamp it is worth a look however few rays there would be: some such elements may send half of the light.
-        let mut is_told = |part| asked == Asked::Mean && is_clear(rays) || !is_smooth(part) && is_clear(u32::MAX);
-        if site.part().is_some_and(&mut is_told) {
-            *is_whole = true;
+        let told = site.part().filter(|part| {
+            let is_worth_a_look = asked == Asked::Mean && is_clear(rays);
+            // Next to a lamp it is however few rays there would be: some such elements may send half of the light.
+            is_worth_a_look || !is_smooth(*part) && is_clear(u32::MAX)
+        });
+        if told.is_some() {
+            (*is_whole, *is_told) = (true, true);
             site.cubature(is_smooth, nodes);
         } else {
             nodes.extend((0..count).map(|index| {
@@ -517,8 +521,8 @@ impl Scratch<'_> {
             parts.push(part);
         }
         let [deviation, within @ ..] = within.map(|lux| lux as f32);
-        let mean = parts.first().map_or(0.0, |whole| whole.mean as f32);
-        Variation { mean, deviation, within: Some(Box::new(within)) }
+        let [whole] = parts[..] else { unreachable!("the parts of a receiver make up one") };
+        Variation { mean: whole.mean as f32, deviation, within: Some(within) }
     }
 
     /// Most parts at any of the places.

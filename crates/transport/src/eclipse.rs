@@ -146,11 +146,14 @@ impl Sights {
     /// tell.
     pub fn are_clear(&mut self, luminaires: &Luminaires, tracer: &Tracer, rays: u32) -> bool {
         let panels = || luminaires.lights.iter().zip(&luminaires.panels).map(|(_, panels)| panels);
+        if panels().any(Vec::is_empty) {
+            return false;
+        }
         let rays = f64::from(rays) / panels().map(Vec::len).sum::<usize>() as f64;
         let mut is_clear = |of| self.between(of, tracer, rays).is_some_and(|found| found.is_empty());
-        panels().enumerate().all(|(light, panels)| {
-            !panels.is_empty() && panels.iter().enumerate().all(|(k, panel)| is_clear((light, panel, k)))
-        })
+        panels()
+            .enumerate()
+            .all(|(light, panels)| panels.iter().enumerate().all(|(k, panel)| is_clear((light, panel, k))))
     }
 
     /// Which blockers stand before a panel, if they are few for so many rays.

@@ -20,7 +20,7 @@ const IN_LIGHT: u32 = 8;
 const LEAST: u32 = 8;
 
 /// How often an element is quartered next to a lamp, at most: into parts a thirty-second as long. Those of 30 cm have all the light of a strip 1 cm away; what is
-/// much nearer keeps an error that no rays mend.
+/// much nearer keeps an error that no rays mend. Nor is a cell cut into smaller elements: once more would be four times as many, of two rays each at least.
 pub const QUARTERED: usize = 5;
 
 /// Where a receiver lies: all that its places need, worked out once.

@@ -97,13 +97,13 @@ fn rays_beyond_the_memory_lie_in_a_temporary_file() {
         command
     };
     let run = |output: &str, memory: &str| Run::of(call(output, memory).output().unwrap());
-    let (whole, little) = (run("a.exr", "1G"), run("b.exr", "700K"));
+    let (whole, little) = (run("a.exr", "1G"), run("b.exr", "900K"));
     assert_eq!((whole.code, little.code), (Some(0), Some(0)), "{whole:?} {little:?}");
     assert!(!whole.err.contains("temporary file") && little.err.contains("temporary file in "), "{}", little.err);
     assert!(room.read("a.exr") == room.read("b.exr"));
 
     let nowhere = room.0.join("nowhere");
-    let failed = Run::of(call("c.exr", "700K").env("TMPDIR", &nowhere).env("TMP", &nowhere).output().unwrap());
+    let failed = Run::of(call("c.exr", "900K").env("TMPDIR", &nowhere).env("TMP", &nowhere).output().unwrap());
     assert_eq!(failed.code, Some(1), "{failed:?}");
     for said in ["KB that memory does not hold", "nowhere: ", "allow more memory, or set"] {
         assert!(failed.err.contains(said) && !failed.err.contains("panicked"), "{}", failed.err);

@@ -101,14 +101,18 @@ impl<'a> Solution<'a> {
             return Err(memory_error(tracer, Elements::count(scene, mesh, element_size), needed, options));
         }
         let lights = Luminaires::most(scene);
+        let needed = |elements: usize, cells: usize| {
+            footprint::solution(tracer, elements, lights).saturating_add(options.stored(cells, elements))
+        };
         let begin = |elements: usize| Begin { monitor, is_soon: elements <= FEW };
         let elements = stages.time(monitor, "elements", || {
             let cells = Elements::new(scene, mesh, element_size);
             let cells = if options.looked_up { cells.shared(element_size) } else { cells };
-            // Coarser light, where there is no room for finer.
-            let room = options.memory.saturating_sub(options.stored(cells.cells()));
-            let most = footprint::most_elements(tracer, room, lights);
-            match divided(tracer, &cells, options.variation, most, &begin(cells.len())) {
+            // Coarser light, where there is no room or time for finer.
+            let (whole, of_piece) = (needed(cells.len(), cells.cells()), needed(1, 0) - needed(0, 0));
+            let in_memory = cells.len() + options.memory.saturating_sub(whole) / of_piece;
+            let in_time = if monitor.deadline().is_some() { FEW.max(cells.len()) } else { usize::MAX };
+            match divided(tracer, &cells, options.variation, in_memory.min(in_time), &begin(cells.len())) {
                 Err(_) if is_over(monitor) => Ok(cells),
                 done => done,
             }
@@ -125,8 +129,7 @@ impl<'a> Solution<'a> {
         })?;
         let sheets = sheets.exposed(&exposure);
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
-        let needed =
-            footprint::solution(tracer, elements.len(), lights).saturating_add(options.stored(elements.cells()));
+        let needed = needed(elements.len(), elements.cells());
         if needed > options.memory {
             return Err(memory_error(tracer, elements.len(), needed, options));
         }
@@ -220,7 +223,8 @@ impl<'a> Solution<'a> {
     /// Bytes of the solution with so many rays, and of what it is made of, as far as they cannot lie in a file.
     fn needed(&self, rays: usize) -> usize {
         let solution = footprint::solution(self.tracer, self.elements.len(), Luminaires::most(self.tracer.scene));
-        solution.saturating_add(SolveOptions { rays, ..self.options }.stored(self.elements.cells()))
+        solution
+            .saturating_add(SolveOptions { rays, ..self.options }.stored(self.elements.cells(), self.elements.len()))
     }
 
     /// Bytes that the scene, its mesh and tree and a solution with these options take, as far as that is known before the
@@ -228,7 +232,7 @@ impl<'a> Solution<'a> {
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
         let cells = Elements::count(tracer.scene, tracer.mesh, element_size(tracer, options));
         let solution = footprint::solution(tracer, cells, Luminaires::most(tracer.scene));
-        solution.saturating_add(options.stored(cells))
+        solution.saturating_add(options.stored(cells, cells))
     }
 
     /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
@@ -510,6 +514,6 @@ impl<'a> Solution<'a> {
 /// What an answer would need that the options do not allow.
 fn memory_error(tracer: &Tracer, elements: usize, needed: usize, options: &SolveOptions) -> Error {
     let least = least_memory(tracer.scene);
-    let rays = (options.stored(elements) > 0).then_some(options.rays);
+    let rays = (options.stored(elements, elements) > 0).then_some(options.rays);
     Error::Memory { elements, rays, needed, allowed: options.memory, least }
 }

@@ -129,10 +129,12 @@ impl SolveOptions {
         if needed > allowed { Err(Error::Elimination { solver, elements, needed, allowed }) } else { Ok(()) }
     }
 
-    /// Bytes of the matrix that the table of so many cells is copied to, for solvers that need rows; none where it is only applied.
-    pub(super) fn stored(&self, cells: usize) -> usize {
+    /// Bytes of the matrix that the table of so many cells and elements is copied to, for solvers that need rows; none where it is only
+    /// applied. Elements of a cell share its rays, and have two at least each.
+    pub(super) fn stored(&self, cells: usize, elements: usize) -> usize {
         let is_stored = self.form_factors.is_none() && !self.solver.applies_only();
-        if is_stored { cells.saturating_mul(self.rays).saturating_mul(ENTRY) } else { 0 }
+        let rays = cells.saturating_mul(self.rays).saturating_add(2 * elements.saturating_sub(cells));
+        if is_stored { rays.saturating_mul(ENTRY) } else { 0 }
     }
 
     /// Fewer rays where they become a matrix that the memory does not hold, and larger elements where no size is asked for: an error that
@@ -140,7 +142,7 @@ impl SolveOptions {
     pub(crate) fn fit(&mut self, tracer: &Tracer, monitor: &dyn Monitor) {
         let lacks_room = |options: &SolveOptions| Solution::memory(tracer, options) > options.memory;
         // Rays that may lie in a file take none of it.
-        while self.rays > LEAST_RAYS && self.stored(1) > 0 && lacks_room(self) {
+        while self.rays > LEAST_RAYS && self.stored(1, 1) > 0 && lacks_room(self) {
             self.rays /= 2;
         }
         let usual = element_size(tracer, self);
