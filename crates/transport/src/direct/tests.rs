@@ -334,7 +334,7 @@ fn how_light_varies_beside_a_lamp_is_known_at_each_quartering() {
         let mut own = [0.0; FINEST];
         let [mean, _] = moments(&e, receivers.site(i).unwrap().part().unwrap(), 0, &mut own);
         assert!((f64::from(told.mean) - mean).abs() < 0.01 * mean, "{i}: {} for {mean}", told.mean);
-        let levels = std::iter::once(told.deviation).chain(**within);
+        let levels = std::iter::once(told.deviation).chain(*within);
         for (level, deviation) in levels.enumerate() {
             truth[level] += area[i] * own[level];
             found[level] += area[i] * f64::from(deviation);
