@@ -286,12 +286,15 @@ impl Board {
         Some(held.status)
     }
 
-    /// The next light of a layer that a page has not seen, about a frame of it.
+    /// The next light of a layer that a page has not seen, about a frame of it. What was posted before it comes before it: a page makes
+    /// nothing of the light of triangles and of cuts that it has not heard of, and it is not sent again.
     pub fn next_light(&self, layer: Layer, seen: &mut Seen) -> Vec<LightChunk> {
         let posts = self.lock();
         let Some((_, watched)) = posts.layers.iter().find(|(of, _)| *of == layer) else { return Vec::new() };
+        let mut others = posts.notices.after(seen.notices).filter(|(_, subject, _)| *subject != Subject::Status);
+        let told = others.next().map_or(u64::MAX, |(revision, ..)| revision);
         let (mut chunks, mut bytes) = (Vec::new(), 0);
-        for (revision, _, chunk) in watched.light.after(seen.light) {
+        for (revision, _, chunk) in watched.light.after(seen.light).take_while(|(revision, ..)| *revision < told) {
             seen.light = revision;
             bytes += 2 * chunk.values.len();
             chunks.push(chunk.clone());
@@ -383,6 +386,29 @@ mod tests {
         while board.next_notice(Some(layer), &mut seen).is_none() {
             assert!(!board.next_light(layer, &mut seen).is_empty());
         }
+    }
+
+    /// However the two questions of a page and what is posted come after each other.
+    #[test]
+    fn light_never_comes_before_the_cuts_that_it_is_of() {
+        let board = Board::new();
+        let mut seen = Seen::default();
+        let layer = Layer::Total;
+        board.watch(layer);
+        board.layers();
+        board.post_light(layer, 7, &[1; 3]);
+        assert!(board.next_notice(Some(layer), &mut seen).is_none());
+        // The solver is quicker than the page is to ask for light.
+        board.post(Subject::Cuts(7), Notice::Text("cuts".into()));
+        board.post_light(layer, 7, &[2; 6]);
+        board.post_light(layer, 8, &[3; 3]);
+        assert!(board.next_light(layer, &mut seen).is_empty());
+        assert_eq!(text(&board, &mut seen).as_deref(), Some("cuts"));
+        assert_eq!(board.next_light(layer, &mut seen).len(), 2);
+        // Older light need not wait.
+        board.post_light(layer, 8, &[4; 3]);
+        board.post(Subject::Cuts(7), Notice::Text("other cuts".into()));
+        assert_eq!(board.next_light(layer, &mut seen).len(), 1);
     }
 
     #[test]
