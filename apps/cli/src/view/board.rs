@@ -119,6 +119,12 @@ struct Posts {
 }
 
 impl Posts {
+    /// The first notice that a page has not seen, but for how far the solution is.
+    fn owed(&self, seen: &Seen) -> Option<(u64, &Notice)> {
+        let mut others = self.notices.after(seen.notices).filter(|(_, subject, _)| *subject != Subject::Status);
+        others.next().map(|(revision, _, notice)| (revision, notice))
+    }
+
     /// Layers that are looked after; those that rest keep no light.
     fn awake(&mut self) -> &mut [(Layer, Watched)] {
         let resting = self.layers.len().saturating_sub(MOST_LAYERS);
@@ -260,8 +266,7 @@ impl Board {
     pub fn next_notice(&self, layer: Option<Layer>, seen: &mut Seen) -> Option<Notice> {
         let mut posts = self.lock();
         let is_coming = posts.awake().iter().any(|(of, watched)| Some(*of) == layer && !watched.is_known);
-        let mut others = posts.notices.after(seen.notices).filter(|(_, subject, _)| *subject != Subject::Status);
-        if let Some((revision, _, notice)) = others.next() {
+        if let Some((revision, notice)) = posts.owed(seen) {
             seen.notices = revision;
             return Some(notice.clone());
         }
@@ -291,8 +296,7 @@ impl Board {
     pub fn next_light(&self, layer: Layer, seen: &mut Seen) -> Vec<LightChunk> {
         let posts = self.lock();
         let Some((_, watched)) = posts.layers.iter().find(|(of, _)| *of == layer) else { return Vec::new() };
-        let mut others = posts.notices.after(seen.notices).filter(|(_, subject, _)| *subject != Subject::Status);
-        let told = others.next().map_or(u64::MAX, |(revision, ..)| revision);
+        let told = posts.owed(seen).map_or(u64::MAX, |(revision, _)| revision);
         let (mut chunks, mut bytes) = (Vec::new(), 0);
         for (revision, _, chunk) in watched.light.after(seen.light).take_while(|(revision, ..)| *revision < told) {
             seen.light = revision;
