@@ -232,7 +232,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                         monitor.warn(&format!("{error}; the answer is that of the rounds before"));
                         ends = true;
                     }
-                    // How much room elements take was known once they were made.
+                    // As many rays do not fit beside the elements that there are: the answer is that of the rounds before.
                     Err(Error::Memory { .. }) => ends = true,
                     done => done?,
                 }
