@@ -618,6 +618,7 @@ mod tests {
                 solver.turn();
             }
             let mut seen = Seen::default();
+            while board.next_notice(None, &mut seen).is_some() {}
             let frames = std::iter::from_fn(|| Some(board.next_light(Layer::Total, &mut seen)));
             let chunks = frames.take_while(|chunks| !chunks.is_empty()).flatten();
             chunks.filter(|chunk| chunk.object == object.0).any(|chunk| chunk.values.iter().any(|value| *value != 0))
@@ -678,7 +679,7 @@ mod tests {
                 .collect();
             assert!(cuts.iter().any(|cuts| cuts.len() > 3), "{cuts:?}");
             for layer in layers {
-                let mut seen = Seen::default();
+                seen.forget_light();
                 let frames = std::iter::from_fn(|| Some(board.next_light(layer, &mut seen)));
                 let chunks: Vec<_> = frames.take_while(|chunks| !chunks.is_empty()).flatten().collect();
                 for cuts in &cuts {
