@@ -1,7 +1,7 @@
 //! `radiosity check`: what is in a scene, and every fault of it.
 
 use crate::input::{self, Input, SceneArguments};
-use crate::numbers::fixed;
+use crate::numbers::place;
 use crate::output::print;
 use crate::{Failure, Global, faults};
 use clap::Args;
@@ -30,12 +30,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<(), Failure> {
 
 fn area(input: &Input) -> f64 {
     (0..input.scene.triangles.len()).map(|t| input.scene.area(t)).sum()
-}
-
-/// Coordinates; what rounds to zero has no sign.
-fn place(p: [f64; 3]) -> String {
-    let [x, y, z] = p.map(|x| fixed(x, 4));
-    format!("[{x}, {y}, {z}]")
 }
 
 fn summary(input: &Input) -> String {

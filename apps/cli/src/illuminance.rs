@@ -105,7 +105,8 @@ impl Sorted {
     }
 
     fn mean(&self) -> f64 {
-        self.0.iter().map(|(lux, area)| lux * area).sum::<f64>() / total_area(&self.0).max(f64::MIN_POSITIVE)
+        // From 0, as the sum of nothing is −0.
+        self.0.iter().fold(0.0, |sum, (lux, area)| sum + lux * area) / total_area(&self.0).max(f64::MIN_POSITIVE)
     }
 
     fn low(&self) -> f64 {

@@ -4,10 +4,11 @@ use crate::input::{self, SceneArguments, SolveArguments};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::report::ErrorReport;
-use crate::{Failure, Global};
+use crate::{Failure, Global, faults, numbers};
 use clap::Args;
 use glam::DVec3;
-use radiosity::{Scene, Tracer, counted, luminance};
+use radiosity::{Bands, Scene, Tracer, counted, luminance};
+use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -18,11 +19,13 @@ pub struct Arguments {
     scene: SceneArguments,
     #[command(flatten)]
     solve: SolveArguments,
-    /// Points: a CSV with the columns x,y,z,nx,ny,nz (metres; unit of the scene's world).
+    /// Points: a CSV whose first line names the columns x,y,z,nx,ny,nz, such as `1.5,0.75,2,0,1,0`: where, in metres of the
+    /// scene's world, and which way the sensor looks; - reads standard input. `radiosity view` saves its grids and working
+    /// planes like this.
     #[arg(long, value_name = "P.csv")]
     points: PathBuf,
     /// The answer: the points with irradiance_r,irradiance_g,irradiance_b,illuminance_lux and the further columns of
-    /// P.csv as they are; standard output if left out.
+    /// P.csv as they are, but for those of an answer before; standard output if left out.
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
 }
@@ -52,6 +55,46 @@ fn strays(scene: &Scene, places: &[(DVec3, DVec3)]) -> Option<String> {
             counted(places.len(), "point", "points")
         )
     })
+}
+
+/// What is said of points without any light in a scene that has some.
+fn dark(scene: &Scene, places: &[(DVec3, DVec3)], irradiance: &[Bands]) -> Option<String> {
+    let is_dark = |e: &Bands| luminance(*e) <= 0.0;
+    let first = irradiance.iter().position(is_dark).filter(|_| !faults::is_dark(scene))?;
+    let count = irradiance.iter().filter(|e| is_dark(e)).count();
+    let of = counted(places.len(), "point", "points");
+    let receive = if count == 1 { "receives" } else { "receive" };
+    let near = numbers::place(places[first].0.to_array());
+    Some(format!(
+        "warning: {count} of {of} {receive} no light at all, the first at {near}: inside a solid, behind a surface, or turned away \
+         from all that is lit (nx,ny,nz is the way that the sensor looks)"
+    ))
+}
+
+/// Illuminance of the points, lx, as lighting is planned by.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Levels {
+    mean: f64,
+    least: f64,
+    most: f64,
+    /// Least over mean.
+    uniformity: f64,
+}
+
+impl Levels {
+    fn of(irradiance: &[Bands]) -> Levels {
+        let lux = || irradiance.iter().map(|e| f64::from(luminance(*e)));
+        let mean = lux().fold(0.0, |sum, e| sum + e) / irradiance.len().max(1) as f64;
+        let [least, most] = [lux().fold(f64::INFINITY, f64::min), lux().fold(0.0, f64::max)];
+        Levels { mean, least, most, uniformity: if mean > 0.0 { least / mean } else { 0.0 } }
+    }
+}
+
+impl std::fmt::Display for Levels {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let Levels { mean, least, most, uniformity } = self;
+        write!(f, "mean {mean:.4} lx, least {least:.4}, most {most:.4}, uniformity {uniformity:.3} (least by mean)")
+    }
 }
 
 /// Runs the verb.
@@ -104,17 +147,22 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             None
         }
     };
+    if let Some(warning) = dark(&input.scene, &places, &measured.irradiance) {
+        progress.say(&warning);
+    }
+    let levels = Levels::of(&measured.irradiance);
     let error = ErrorReport::new((&measured.audit, &measured.audit), &arguments.solve, measured.out_of_time);
     if global.json {
         let values: Option<&[radiosity::Bands]> = arguments.output.is_none().then_some(&measured.irradiance);
         let result = serde_json::json!({
             "event": "result", "error": error, "rounds": measured.rounds, "relative_residual": measured.residual,
             "guaranteed_bound": measured.bound, "stages": progress.spent(), "seconds": progress.seconds(),
-            "output": arguments.output, "irradiance": values,
+            "output": arguments.output, "illuminance": levels, "irradiance": values,
         });
         return print(&result.to_string());
     }
     progress.say(&error.line());
+    progress.say(&levels.to_string());
     if let Some(wrote) = wrote {
         progress.say(&wrote);
     }

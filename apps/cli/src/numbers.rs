@@ -10,6 +10,12 @@ pub fn fixed(x: f64, decimals: usize) -> String {
     if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
+/// Coordinates; what rounds to zero has no sign.
+pub fn place(p: [f64; 3]) -> String {
+    let [x, y, z] = p.map(|x| fixed(x, 4));
+    format!("[{x}, {y}, {z}]")
+}
+
 /// A number above zero to two digits, or to its whole ones.
 pub fn rough(x: f64) -> String {
     fixed(x, (1.0 - x.log10().floor()).clamp(0.0, 20.0) as usize)

@@ -12,6 +12,10 @@ use std::time::{Duration, Instant};
 /// Events are printed at most this often.
 const EVERY_MILLISECONDS: u64 = 200;
 
+/// Where there is no terminal, a line tells of progress this often.
+const LOG_EVERY_MILLISECONDS: u64 = 60_000;
+const LOG_VERBOSELY_EVERY_MILLISECONDS: u64 = 10_000;
+
 /// Watches a run for the user.
 pub struct Progress {
     bar: ProgressBar,
@@ -23,6 +27,9 @@ pub struct Progress {
     limit: AtomicU64,
     stage: Mutex<Stage>,
     last: AtomicU64,
+    /// Milliseconds between lines where there is neither a bar nor events, and when the last one was.
+    logs_every: Option<u64>,
+    logged: AtomicU64,
 }
 
 /// What is being done, and the seconds that all parts of the work took so far. Every moment belongs to the part that
@@ -59,9 +66,10 @@ impl Stage {
 }
 
 impl Progress {
-    /// A bar on a terminal, events with `--json`, nothing otherwise.
+    /// A bar on a terminal, events with `--json`, a line now and then otherwise.
     pub fn new(global: &Global) -> Progress {
-        let visible = !global.json && !global.quiet && std::io::stderr().is_terminal();
+        let speaks = !global.json && !global.quiet;
+        let visible = speaks && std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr_with_hz(8) } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(1), target);
         let template = "{prefix:>14} [{bar:32}] {percent:>3} %  {elapsed} passed and {eta} left of this stage";
@@ -81,6 +89,12 @@ impl Progress {
             limit: AtomicU64::new(f64::INFINITY.to_bits()),
             stage: Mutex::new(stage),
             last: AtomicU64::new(0),
+            logs_every: match (speaks && !visible, global.verbose) {
+                (false, _) => None,
+                (true, false) => Some(LOG_EVERY_MILLISECONDS),
+                (true, true) => Some(LOG_VERBOSELY_EVERY_MILLISECONDS),
+            },
+            logged: AtomicU64::new(0),
         }
     }
 
@@ -169,6 +183,27 @@ impl Progress {
         }
     }
 
+    /// The stage, and the seconds that are left of it if the rest is like what is done.
+    fn stage_left(&self, done: usize, total: usize) -> (String, f64) {
+        let stage = self.lock();
+        let passed = stage.since.elapsed().as_secs_f64();
+        (stage.name.clone(), passed * (total - done.min(total)) as f64 / done.max(1) as f64)
+    }
+
+    /// A line of progress where it is time for one: in a log there is no bar.
+    fn log(&self, now: u64, done: usize, total: usize) {
+        let Some(every) = self.logs_every else { return };
+        let logged = self.logged.load(Ordering::Relaxed);
+        if now < logged + every
+            || self.logged.compare_exchange(logged, now, Ordering::Relaxed, Ordering::Relaxed).is_err()
+        {
+            return;
+        }
+        let (name, left) = self.stage_left(done, total);
+        let percent = 100 * done.min(total) / total.max(1);
+        self.say(&format!("{:.0} s: {name}, {percent} %, {left:.0} s left of this stage", self.seconds()));
+    }
+
     fn lock(&self) -> MutexGuard<'_, Stage> {
         self.stage.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -228,15 +263,13 @@ impl Monitor for Progress {
             self.bar.set_length(total as u64);
             self.bar.set_position(done as u64);
             if self.json {
-                let stage = self.lock();
-                let (name, since) = (stage.name.clone(), stage.since);
-                drop(stage);
-                let left = since.elapsed().as_secs_f64() * (total - done.min(total)) as f64 / done.max(1) as f64;
+                let (name, left) = self.stage_left(done, total);
                 self.tell(&json!({
                     "event": "progress", "stage": name, "done": done, "total": total,
                     "seconds": self.seconds(), "seconds_left_in_stage": left,
                 }));
             }
+            self.log(now, done, total);
         }
         true
     }

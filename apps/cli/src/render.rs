@@ -5,7 +5,7 @@ use crate::input::{self, PictureArguments, SceneArguments, SolveArguments};
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::report::ErrorReport;
-use crate::{Failure, Global, views};
+use crate::{Failure, Global, numbers, views};
 use clap::Args;
 use radiosity::{After, Monitor, RenderOptions, Tracer};
 use std::path::PathBuf;
@@ -58,7 +58,12 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.commit()?;
 
     let is_over = baked.out_of_time || view.shadow_rays < render.shadowing.rays || progress.is_over();
-    let error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
+    let mut error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
+    if error.upper_95_one_sided.is_finite() {
+        let closer = numbers::rough(100.0 * error.asked * error.asked / error.upper_95_one_sided);
+        error.finer =
+            format!("the camera looks at harder places than there are on the whole; --error {closer}% comes nearer");
+    }
     let shown = baked.solution.displayed(Some(exposure));
     if global.json {
         let result = serde_json::json!({

@@ -4,7 +4,7 @@ use crate::illuminance::Illuminance;
 use crate::progress::Progress;
 use crate::{Failure, figures, input};
 use radiosity::measure::Round;
-use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Shown, Sky, View, WrittenRound};
+use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Shown, Sky, View, WrittenRound, counted};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -135,12 +135,13 @@ impl ErrorReport {
             return "nothing to audit: there is no surface".to_owned();
         }
         if self.mean_illuminance == 0.0 && self.estimated == 0.0 {
-            return "there is no light: all is black".to_owned();
+            let places = counted(self.points, "place", "places");
+            return format!("all is black: the audit finds no light at {places}, either");
         }
         let percent = |x: f64| format!("{:.3} %", 100.0 * x);
         let verdict = match (self.achieved, self.out_of_time) {
             (true, _) => "reached",
-            (false, true) => "NOT reached, as the time was over",
+            (false, true) => "NOT reached in the time given",
             (false, false) => "NOT reached",
         };
         let bound = match self.upper_95_one_sided {

@@ -1,7 +1,7 @@
 //! Points to measure at, from CSV: a header that names x, y, z, nx, ny, nz in any order; further columns are kept.
 
 use crate::LoadError;
-use crate::source::read_plain_file;
+use crate::source::{read_bounded, read_plain_file};
 use glam::DVec3;
 use radiosity_scene::{Faults, counted};
 use std::path::Path;
@@ -29,9 +29,14 @@ pub struct Points {
     pub cells: Vec<Vec<String>>,
 }
 
-/// Reads points from a CSV file. Every bad line is an error with its number.
+/// Reads points from a CSV file, of `-` from standard input. Every bad line is an error with its number.
 pub fn read_points_csv(path: &Path) -> Result<Points, LoadError> {
-    let bytes = read_plain_file(path).map_err(|error| LoadError::Io { path: path.to_owned(), error })?;
+    let is_piped = path == Path::new("-");
+    let read = if is_piped { read_bounded(std::io::stdin()) } else { read_plain_file(path) };
+    let bytes = read.map_err(|error| LoadError::Io { path: path.to_owned(), error })?;
+    if is_piped {
+        return parse_points_csv("standard input", &bytes);
+    }
     let file = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
     parse_points_csv(&file, &bytes)
 }
@@ -113,15 +118,20 @@ fn split(line: &str, separator: char) -> Vec<String> {
 }
 
 fn point(cells: &[String], columns: [usize; 6], comma: bool) -> Result<Point, (String, &'static str)> {
+    let is_otherwise = cells.len() == 1 && cells[0].contains([',', ';', '\t']);
+    let hint = |usual| if is_otherwise { "divide columns by what divides the header" } else { usual };
     let mut values = [0.0; 6];
     for ((value, column), name) in values.iter_mut().zip(columns).zip(["x", "y", "z", "nx", "ny", "nz"]) {
         let Some(text) = cells.get(column) else {
-            return Err((format!("only {} columns, none for {name}", cells.len()), "complete the line"));
+            return Err((
+                format!("only {}, none for {name}", counted(cells.len(), "column", "columns")),
+                hint("complete the line"),
+            ));
         };
         let parsed = if comma { text.replace(',', ".").parse() } else { text.parse() };
         *value = parsed.map_err(|_| {
             let shown: String = text.chars().take(40).collect();
-            (format!("{name} '{shown}' is not a number"), "write a number with a decimal point")
+            (format!("{name} '{shown}' is not a number"), hint("write a number with a decimal point"))
         })?;
         if !f64::is_finite(*value) {
             return Err((format!("{name} is {text}"), "write a finite number"));
@@ -183,6 +193,8 @@ mod tests {
         ] {
             assert!(text.contains(expected), "{text}");
         }
+        let text = parse_points_csv("p.csv", b"x,y,z,nx,ny,nz\n1;2;3;0;0;1\n").unwrap_err().to_string();
+        assert!(text.contains("x '1;2;3;0;0;1' is not a number") && text.contains("divides the header"), "{text}");
         let many = format!("x,y,z,nx,ny,nz\n{}", "a\n".repeat(1000));
         let text = parse_points_csv("p.csv", many.as_bytes()).unwrap_err().to_string();
         assert!(text.lines().count() == 21 && text.contains("980 more"), "{text}");

@@ -4,6 +4,7 @@
 //! one of them shows its black back where its neighbour shows its front. Only edges of exactly two faces are judged:
 //! where more meet, as at a wall that stands on a floor, no pair belongs together.
 
+use glam::DVec3;
 use radiosity::{EdgeSide, Mesh, Scene};
 use std::collections::BTreeMap;
 
@@ -11,12 +12,44 @@ use std::collections::BTreeMap;
 /// (cosine of 0.8°).
 const FOLDED: f64 = 0.9999;
 
-/// How many edges of each object lie between two faces of it that look opposite ways, from the sides of all edges.
+/// Edges of an object that are doubtful.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Edges {
+    /// How many.
+    pub count: usize,
+    /// The middle of the first, metres.
+    pub first: DVec3,
+}
+
+impl Edges {
+    fn add(&mut self, mesh: &Mesh, side: &EdgeSide) {
+        if self.count == 0 {
+            let (triangle, corner) = side.place();
+            let corners = mesh.corners(triangle);
+            self.first = 0.5 * (corners[corner] + corners[(corner + 1) % 3]);
+        }
+        self.count += 1;
+    }
+}
+
+/// Edges of each object at which three faces of it or more meet, from the sides of all edges.
+pub fn branches(scene: &Scene, mesh: &Mesh, sides: &[EdgeSide]) -> BTreeMap<usize, Edges> {
+    let mut found: BTreeMap<usize, Edges> = BTreeMap::new();
+    for faces in sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| faces.len() > 2) {
+        let object = |side: &EdgeSide| scene.triangle_object[mesh.source[side.place().0] as usize];
+        if faces.iter().all(|side| object(side) == object(&faces[0])) {
+            found.entry(object(&faces[0]) as usize).or_default().add(mesh, &faces[0]);
+        }
+    }
+    found
+}
+
+/// Edges of each object between two faces of it that look opposite ways, from the sides of all edges.
 ///
 /// Faces of different objects are not compared: what touches need not belong together. Two-sided faces have no wrong
 /// way.
-pub fn edges(scene: &Scene, mesh: &Mesh, sides: &[EdgeSide]) -> BTreeMap<usize, usize> {
-    let mut found = BTreeMap::new();
+pub fn edges(scene: &Scene, mesh: &Mesh, sides: &[EdgeSide]) -> BTreeMap<usize, Edges> {
+    let mut found: BTreeMap<usize, Edges> = BTreeMap::new();
     for faces in sides.chunk_by(|a, b| a.edge == b.edge) {
         let [one, other] = faces else { continue };
         let [s, t] = [one, other].map(|side| side.place().0);
@@ -24,7 +57,7 @@ pub fn edges(scene: &Scene, mesh: &Mesh, sides: &[EdgeSide]) -> BTreeMap<usize, 
         let alike = one.forward == other.forward && object(s) == object(t);
         let judged = alike && mesh.normal(s).dot(mesh.normal(t)) < FOLDED;
         if judged && !scene.material(mesh.source[t] as usize).has_two_sides() {
-            *found.entry(object(t)).or_default() += 1;
+            found.entry(object(t)).or_default().add(mesh, one);
         }
     }
     found

@@ -4,6 +4,8 @@ mod flipped;
 mod overlap;
 pub mod sheets;
 
+use crate::numbers;
+use glam::DVec3;
 use radiosity::{EdgeSide, Faults, Mesh, PointLight, Scene, counted};
 
 /// Adds the faults of a scene that can be read; `title` is what the scene is called.
@@ -23,11 +25,22 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
         );
     }
     let place = |object: usize| format!("{title}: object '{}'", scene.objects[object].name);
-    for (object, count) in flipped::edges(scene, mesh, &sides) {
-        let edges = counted(count, "edge lies", "edges lie");
+    let near = |p: DVec3| format!("near {}", numbers::place(p.to_array()));
+    for (object, edges) in flipped::branches(scene, mesh, &sides) {
+        let (edges, near) = (counted(edges.count, "edge joins", "edges join"), near(edges.first));
+        faults.note(
+            place(object),
+            format!("{edges} three faces or more, {near}: surfaces branch there, and which of them continue each other is open"),
+            "harmless where each face looks the way that is meant",
+        );
+    }
+    for (object, edges) in flipped::edges(scene, mesh, &sides) {
+        let (edges, near) = (counted(edges.count, "edge lies", "edges lie"), near(edges.first));
         faults.warning(
             place(object),
-            format!("{edges} between faces that look opposite ways: one shows its black back beside the other's front"),
+            format!(
+                "{edges} between faces that look opposite ways, {near}: one shows its black back beside the other's front"
+            ),
             "turn the faces that look the wrong way ('recalculate normals'), or make the material two-sided",
         );
     }
@@ -56,7 +69,7 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
 }
 
 /// Whether nothing gives light: materials count where a face has them.
-fn is_dark(scene: &Scene) -> bool {
+pub fn is_dark(scene: &Scene) -> bool {
     let is_lamp = |light: &PointLight| light.intensity.iter().any(|&i| i > 0.0);
     let shines = |triangle| scene.material(triangle).emits();
     scene.sky.is_black() && !scene.lights.iter().any(is_lamp) && !(0..scene.triangles.len()).any(shines)

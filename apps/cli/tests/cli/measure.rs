@@ -1,6 +1,6 @@
 //! `radiosity measure`, and the classic methods and solvers that it takes by their names.
 
-use crate::Room;
+use crate::{Room, Run};
 use serde_json::Value;
 
 #[test]
@@ -43,6 +43,29 @@ fn points_outside_the_scene_are_told() {
     let run = room.run(["measure", "--points", "p.csv", "--error", "20%"]);
     assert_eq!(run.code, Some(0), "{run:?}");
     assert!(run.err.contains("warning: 2 of 3 points lie outside the scene"), "{}", run.err);
+}
+
+/// A normal into the floor reads no light, and that there is none in the scene would be the wrong reason. Points come by a pipe as well.
+#[test]
+fn points_without_light_are_told_and_levels_summed_up() {
+    let room = Room::new("measure-dark");
+    room.write("p.csv", "x,y,z,nx,ny,nz\n0.1,0.001,0.05,0,1,0\n0.2,0.1,0.2,0,1,0\n0.3,0.001,0.05,0,1,0\n");
+    let mut command = room.command(["measure", "--points", "-", "--error", "20%", "--json"]);
+    command.stdin(std::fs::File::open(room.path("p.csv")).unwrap());
+    let run = Run::of(command.output().unwrap());
+    let told = "1 of 3 points receives no light at all, the first at [0.2000, 0.1000, 0.2000]";
+    assert!(run.code == Some(0) && run.out.contains(told), "{run:?}");
+    let result = run.result();
+    let lux: Vec<f64> = result["irradiance"].as_array().unwrap().iter().map(|e| e[1].as_f64().unwrap()).collect();
+    let levels = &result["illuminance"];
+    assert!(lux[0] > 0.0 && lux[1] == 0.0 && lux[2] > 0.0, "{lux:?}");
+    assert!(levels["least"] == 0.0 && levels["uniformity"] == 0.0 && levels["mean"].as_f64().unwrap() > 1.0);
+    assert!(levels["most"].as_f64() > levels["mean"].as_f64());
+
+    room.write("p.csv", "x,y,z,nx,ny,nz\n0.2,0.1,0.2,0,1,0\n");
+    let run = room.run(["measure", "--points", "p.csv", "--error", "20%"]);
+    assert!(run.code == Some(0) && run.err.contains("1 of 1 point receives no light at all"), "{run:?}");
+    assert!(!run.err.contains("there is no light"), "{run:?}");
 }
 
 /// Classic methods and solvers by their names give the light that rays give.

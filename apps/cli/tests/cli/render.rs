@@ -92,7 +92,7 @@ fn a_limit_of_time_and_nearness_on_the_display_are_told() {
     let error = &run.result()["error"];
     assert_eq!((&error["achieved"], &error["out_of_time"]), (&false.into(), &true.into()), "{error}");
     let said = room.run([&["render", "-o", "b.png", "--error", "0.01%", "--budget", "1s"], &few[..]].concat());
-    assert!(said.code == Some(0) && said.err.contains("NOT reached, as the time was over"), "{said:?}");
+    assert!(said.code == Some(0) && said.err.contains("NOT reached in the time given"), "{said:?}");
     assert_eq!(room.names(), ["a.png", "b.png"]);
 
     let near = ["--error", "20%", "--delta-e", "2", "--exposure", "-6"];
