@@ -200,6 +200,12 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             "warning: no light of the sky reaches any surface; the model has no opening, or faces look the wrong way",
         );
     }
+    if baked.solution.rays() == 0 && arguments.solve.form_factors.0.is_none() {
+        progress.say(
+            "warning: there was no time for rays between elements: figures of elements hold a rough guess of what is reflected \
+             (allow more --time)",
+        );
+    }
     let written = (&audit, rounds, lightmap, is_hurried);
     let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref(), exposure), written, &files, progress)?;
     for path in &arguments.report {
@@ -212,7 +218,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.stage(path, text.as_bytes())?;
     }
     outputs.commit()?;
-    tell(&report, &arguments.solve, global, progress)
+    tell(&report, arguments.solve.delta_e, global, progress)
 }
 
 fn output_path(arguments: &Arguments) -> PathBuf {
@@ -258,13 +264,13 @@ struct ResultEvent<'a> {
 }
 
 /// The last word: what was reached and where it is.
-fn tell(report: &Report, solve: &SolveArguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
+fn tell(report: &Report, delta_e: Option<f64>, global: &Global, progress: &Progress) -> Result<(), Failure> {
     if global.json {
         let event = ResultEvent { event: "result", report };
         return print(&serde_json::to_string(&event).map_err(Failure::work)?);
     }
     progress.say(&report.error.line());
-    if let Some(asked) = solve.delta_e {
+    if let Some(asked) = delta_e {
         progress.say(&views::nearness(&report.solution.displayed, asked));
     }
     if let Some(map) = report.lightmap.as_ref().filter(|map| map.reduced_charts > 0) {
@@ -275,9 +281,6 @@ fn tell(report: &Report, solve: &SolveArguments, global: &Global, progress: &Pro
         ));
     }
     let (solution, light) = (&report.solution, &report.illuminance);
-    if solution.rays_per_cell == 0 && solve.form_factors.0.is_none() {
-        progress.say("warning: there was no time for rays between elements, so what is reflected is a first guess in these figures:");
-    }
     let memory = report.peak_memory_mb.map_or(String::new(), |mb| format!(", {mb:.0} MB"));
     progress.say(&format!(
         "{} elements in {} cells x {} rays, {:.1} s{memory}; illuminance of the lit area: mean {:.4} lx, 95 % of it above {:.4}, brightest {:.4}",

@@ -53,7 +53,8 @@ pub struct Global {
     /// Say nothing but errors (`check`: and warnings); with --json, errors and the result.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say more: the rounds of refinement, notes on the input.
+    /// Say more: the rounds of refinement, notes on the input; without a terminal how far the work has come, every ten seconds
+    /// instead of every minute.
     #[arg(short, long, global = true)]
     verbose: bool,
 }

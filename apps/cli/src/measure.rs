@@ -47,7 +47,7 @@ fn strays(scene: &Scene, places: &[(DVec3, DVec3)]) -> Option<String> {
     let beside = BESIDE * (high - low).max_element();
     let is_outside = |p: &DVec3| p.cmplt(low - beside).any() || p.cmpgt(high + beside).any();
     let outside = places.iter().filter(|(p, _)| is_outside(p)).count();
-    let [low, high] = [low, high].map(|p| format!("({:.4}, {:.4}, {:.4})", p.x, p.y, p.z));
+    let [low, high] = [low, high].map(|p| numbers::place(p.to_array()));
     (outside > 0).then(|| {
         format!(
             "warning: {outside} of {} lie outside the scene, which reaches from {low} to {high} m (are they in its axes and \
@@ -64,10 +64,10 @@ fn dark(scene: &Scene, places: &[(DVec3, DVec3)], irradiance: &[Bands]) -> Optio
     let count = irradiance.iter().filter(|e| is_dark(e)).count();
     let of = counted(places.len(), "point", "points");
     let receive = if count == 1 { "receives" } else { "receive" };
-    let near = numbers::place(places[first].0.to_array());
+    let first_at = numbers::place(places[first].0.to_array());
     Some(format!(
-        "warning: {count} of {of} {receive} no light at all, the first at {near}: inside a solid, behind a surface, or turned away \
-         from all that is lit (nx,ny,nz is the way that the sensor looks)"
+        "warning: {count} of {of} {receive} no light at all, the first at {first_at} m: inside a solid, behind a surface, turned \
+         away from all that is lit, or where no ray found any (nx,ny,nz is the way that the sensor looks)"
     ))
 }
 
@@ -76,7 +76,7 @@ fn dark(scene: &Scene, places: &[(DVec3, DVec3)], irradiance: &[Bands]) -> Optio
 struct Levels {
     mean: f64,
     least: f64,
-    most: f64,
+    largest: f64,
     /// Least over mean.
     uniformity: f64,
 }
@@ -84,16 +84,19 @@ struct Levels {
 impl Levels {
     fn of(irradiance: &[Bands]) -> Levels {
         let lux = || irradiance.iter().map(|e| f64::from(luminance(*e)));
-        let mean = lux().fold(0.0, |sum, e| sum + e) / irradiance.len().max(1) as f64;
-        let [least, most] = [lux().fold(f64::INFINITY, f64::min), lux().fold(0.0, f64::max)];
-        Levels { mean, least, most, uniformity: if mean > 0.0 { least / mean } else { 0.0 } }
+        let mean = lux().sum::<f64>() / irradiance.len().max(1) as f64;
+        let [least, largest] = [lux().fold(f64::INFINITY, f64::min), lux().fold(0.0, f64::max)];
+        Levels { mean, least, largest, uniformity: if mean > 0.0 { least / mean } else { 0.0 } }
     }
 }
 
 impl std::fmt::Display for Levels {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        let Levels { mean, least, most, uniformity } = self;
-        write!(f, "mean {mean:.4} lx, least {least:.4}, most {most:.4}, uniformity {uniformity:.3} (least by mean)")
+        let Levels { mean, least, largest, uniformity } = self;
+        write!(
+            f,
+            "mean {mean:.4} lx, least {least:.4}, largest {largest:.4}, uniformity {uniformity:.3} (least over mean)"
+        )
     }
 }
 
@@ -106,7 +109,10 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         outputs.promise(path, &["csv"])?;
     }
     progress.part("reading");
-    let read = radiosity::io::read_points_csv(&arguments.points)?;
+    let read = match arguments.points.as_os_str() == "-" {
+        true => radiosity::io::read_points("standard input", std::io::stdin())?,
+        false => radiosity::io::read_points_csv(&arguments.points)?,
+    };
     let points = &read.points;
     let input = input::load(&arguments.scene, arguments.solve.memory, global, progress)?;
     outputs.spare(&input.files)?;

@@ -199,9 +199,17 @@ impl Progress {
         {
             return;
         }
+        self.say(&format!("{:.0} s: {}", self.seconds(), self.told(done, total)));
+    }
+
+    /// How far a stage has come.
+    fn told(&self, done: usize, total: usize) -> String {
         let (name, left) = self.stage_left(done, total);
-        let percent = 100 * done.min(total) / total.max(1);
-        self.say(&format!("{:.0} s: {name}, {percent} %, {left:.0} s left of this stage", self.seconds()));
+        let name = in_round(&name, self.lock().round);
+        match 100 * done.min(total) / total.max(1) {
+            0 => format!("{name} has begun"),
+            percent => format!("{name}, {percent} %, {left:.0} s left of this stage"),
+        }
     }
 
     fn lock(&self) -> MutexGuard<'_, Stage> {
@@ -216,10 +224,7 @@ impl Progress {
         let round = stage.round;
         drop(stage);
         self.bar.reset();
-        self.bar.set_prefix(match round {
-            Some([round, most]) => format!("round {round} of {most} at most: {name}"),
-            None => name.to_owned(),
-        });
+        self.bar.set_prefix(in_round(name, round));
         self.last.store(0, Ordering::Relaxed);
         if self.json && is_new {
             self.tell(&json!({
@@ -235,6 +240,14 @@ impl Progress {
         }
         // A listener that has gone does not stop the work: its files are still wanted.
         let _ = output::print(&event.to_string());
+    }
+}
+
+/// The name of a stage with the round that it is in.
+fn in_round(name: &str, round: Option<[usize; 2]>) -> String {
+    match round {
+        Some([round, most]) => format!("round {round} of {most} at most: {name}"),
+        None => name.to_owned(),
     }
 }
 
@@ -293,6 +306,23 @@ impl Monitor for Progress {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// As a log has it, where a bar would be.
+    #[test]
+    fn lines_tell_how_far_a_stage_has_come() {
+        let progress = Progress::new(&Global { threads: None, json: false, quiet: true, verbose: false });
+        progress.part("picture");
+        assert_eq!(progress.told(0, 0), "picture has begun");
+        progress.parts();
+        progress.round(2, 6);
+        progress.stage("rays");
+        assert_eq!(progress.told(1, 1000), "round 2 of 6 at most: rays has begun");
+        let told = progress.told(500, 1000);
+        assert!(
+            told.starts_with("round 2 of 6 at most: rays, 50 %, ") && told.ends_with(" s left of this stage"),
+            "{told}"
+        );
+    }
 
     #[test]
     fn parts_make_up_the_whole() {

@@ -24,6 +24,9 @@ pub struct Arguments {
     picture: PictureArguments,
 }
 
+/// The least error that can be asked for, percent.
+const LEAST_PERCENT: f64 = 0.01;
+
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let mut outputs = Outputs::new(&arguments.scene.files());
@@ -59,10 +62,16 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
 
     let is_over = baked.out_of_time || view.shadow_rays < render.shadowing.rays || progress.is_over();
     let mut error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
-    if error.upper_95_one_sided.is_finite() {
-        let closer = numbers::rough(100.0 * error.asked * error.asked / error.upper_95_one_sided);
-        error.finer =
-            format!("the camera looks at harder places than there are on the whole; --error {closer}% comes nearer");
+    if error.is_lost_in_writing() {
+        let closer = 100.0 * error.asked * error.asked / error.upper_95_one_sided;
+        error.finer = match (is_over, closer < LEAST_PERCENT) {
+            (true, _) => "allow more --time for the picture".to_owned(),
+            (false, true) => "the camera looks at harder places than there are on the whole".to_owned(),
+            (false, false) => format!(
+                "the camera looks at harder places than there are on the whole; --error {}% comes nearer",
+                numbers::rough(closer)
+            ),
+        };
     }
     let shown = baked.solution.displayed(Some(exposure));
     if global.json {

@@ -97,7 +97,7 @@ pub struct ErrorReport {
     pub solution_estimated: f64,
     /// Its one-sided 95 % bound from above.
     pub solution_upper_95_one_sided: f64,
-    /// How more of the solution would be kept where it is written.
+    /// What would help where the solution meets what is asked, and what is written or seen of it does not.
     pub finer: String,
 }
 
@@ -136,7 +136,7 @@ impl ErrorReport {
         }
         if self.mean_illuminance == 0.0 && self.estimated == 0.0 {
             let places = counted(self.points, "place", "places");
-            return format!("all is black: the audit finds no light at {places}, either");
+            return format!("all is black, and the audit finds no light at any of {places}");
         }
         let percent = |x: f64| format!("{:.3} %", 100.0 * x);
         let verdict = match (self.achieved, self.out_of_time) {

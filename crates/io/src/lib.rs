@@ -38,7 +38,7 @@ pub use factors_out::{FactorFormat, FactorRows, FactorTable, FactorsError, write
 pub use gltf::{Document, EncodedImage};
 pub use load::{Loaded, load};
 pub use options::LoadOptions;
-pub use points::{Point, Points, parse_points_csv, read_points_csv};
+pub use points::{Point, Points, parse_points_csv, read_points, read_points_csv};
 pub use sky::{load_sky_hdr, parse_sky};
 pub use source::{Folder, Memory, Source, SourceError};
 pub use staged::Staged;

@@ -29,16 +29,17 @@ pub struct Points {
     pub cells: Vec<Vec<String>>,
 }
 
-/// Reads points from a CSV file, of `-` from standard input. Every bad line is an error with its number.
+/// Reads points from a CSV file. Every bad line is an error with its number.
 pub fn read_points_csv(path: &Path) -> Result<Points, LoadError> {
-    let is_piped = path == Path::new("-");
-    let read = if is_piped { read_bounded(std::io::stdin()) } else { read_plain_file(path) };
-    let bytes = read.map_err(|error| LoadError::Io { path: path.to_owned(), error })?;
-    if is_piped {
-        return parse_points_csv("standard input", &bytes);
-    }
+    let bytes = read_plain_file(path).map_err(|error| LoadError::Io { path: path.to_owned(), error })?;
     let file = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
     parse_points_csv(&file, &bytes)
+}
+
+/// As [`read_points_csv`], from a stream, as standard input is one; `name` is the name for messages.
+pub fn read_points(name: &str, from: impl std::io::Read) -> Result<Points, LoadError> {
+    let bytes = read_bounded(from).map_err(|error| LoadError::Io { path: name.into(), error })?;
+    parse_points_csv(name, &bytes)
 }
 
 /// As [`read_points_csv`], from memory; `file` is the name for messages.
@@ -118,20 +119,20 @@ fn split(line: &str, separator: char) -> Vec<String> {
 }
 
 fn point(cells: &[String], columns: [usize; 6], comma: bool) -> Result<Point, (String, &'static str)> {
-    let is_otherwise = cells.len() == 1 && cells[0].contains([',', ';', '\t']);
-    let hint = |usual| if is_otherwise { "divide columns by what divides the header" } else { usual };
+    let has_separator = |cell: &str| cell.contains([',', ';', '\t']);
+    let hint = |cell: &str, usual| if has_separator(cell) { "separate columns as the header does" } else { usual };
     let mut values = [0.0; 6];
     for ((value, column), name) in values.iter_mut().zip(columns).zip(["x", "y", "z", "nx", "ny", "nz"]) {
         let Some(text) = cells.get(column) else {
             return Err((
                 format!("only {}, none for {name}", counted(cells.len(), "column", "columns")),
-                hint("complete the line"),
+                hint(&cells[0], "complete the line"),
             ));
         };
         let parsed = if comma { text.replace(',', ".").parse() } else { text.parse() };
         *value = parsed.map_err(|_| {
             let shown: String = text.chars().take(40).collect();
-            (format!("{name} '{shown}' is not a number"), hint("write a number with a decimal point"))
+            (format!("{name} '{shown}' is not a number"), hint(text, "write a number with a decimal point"))
         })?;
         if !f64::is_finite(*value) {
             return Err((format!("{name} is {text}"), "write a finite number"));
@@ -194,7 +195,7 @@ mod tests {
             assert!(text.contains(expected), "{text}");
         }
         let text = parse_points_csv("p.csv", b"x,y,z,nx,ny,nz\n1;2;3;0;0;1\n").unwrap_err().to_string();
-        assert!(text.contains("x '1;2;3;0;0;1' is not a number") && text.contains("divides the header"), "{text}");
+        assert!(text.contains("x '1;2;3;0;0;1' is not a number") && text.contains("as the header does"), "{text}");
         let many = format!("x,y,z,nx,ny,nz\n{}", "a\n".repeat(1000));
         let text = parse_points_csv("p.csv", many.as_bytes()).unwrap_err().to_string();
         assert!(text.lines().count() == 21 && text.contains("980 more"), "{text}");

@@ -16,10 +16,6 @@ use std::time::Instant;
 /// Cells to aim for: 10,000 leave those of a room with a garden 0.4 m wide, and contacts blurred.
 const CELLS: usize = 30_000;
 
-/// Cells to begin with within a time limit where elements are only looked up: later rounds have more, as there is time for them. With 30,000 an
-/// office of 84,000 triangle sides is 29 % off after 6 s, and 14 % after 11 s; with these 17 and 13 %.
-const FEW_CELLS: usize = 5_000;
-
 /// Cells along the mean path of light where elements are only looked up. Nearer than its own width an element is not looked up
 /// but followed on from, and a gather of wide ones is a path tracer: in a building of 64 furnished rooms one of 64 rays is
 /// 38 % off with 25 cells in a room, 27 % with 125, 14 % with 500, 11 % with 1,500.
@@ -125,16 +121,13 @@ struct Reading {
     light: Vec<Bands>,
 }
 
-/// How a scene is solved at first. Where it has more triangles than cells are wanted, most are parts of small things, which
+/// How a scene is solved where there is time. Where it has more triangles than cells are wanted, most are parts of small things, which
 /// take all the time if each has the rays of a cell: they get them by their area, and what is shown is gathered.
 fn suited(tracer: &Tracer, options: &BakeOptions, monitor: &dyn Monitor) -> SolveOptions {
     let mut solve = options.solve;
     solve.looked_up = tracer.mesh.triangles.len() > CELLS && solve.form_factors.is_none();
-    let is_hurried = solve.looked_up && monitor.deadline().is_some();
-    solve.cells = solve.cells.max(if is_hurried { FEW_CELLS } else { CELLS });
+    solve.cells = solve.cells.max(CELLS);
     if solve.looked_up {
-        // Places of texels, vertices and pixels are asked one by one whether they are buried.
-        solve.shown = !is_hurried;
         solve.cells_on_path(tracer, CELLS_ON_PATH);
     } else {
         solve.rays = solve.rays.max(rays_for(options.error, 512.0, FEWEST_RAYS, 2048));
@@ -142,6 +135,21 @@ fn suited(tracer: &Tracer, options: &BakeOptions, monitor: &dyn Monitor) -> Solv
     solve.suit_method();
     solve.fit(tracer, monitor);
     solve
+}
+
+/// How a scene is solved at first within a time limit, if it is not as usual: elements that are only looked up are as few as may be, and places
+/// that are shown are asked one by one whether they are buried. With as many as usual from the beginning, an office of 84,000 triangle
+/// sides is 29 % off after 6 s, and 14 % after 11 s; so 18 % after 6 s, and 8 % after 10 s.
+fn hurried(
+    usual: &SolveOptions,
+    tracer: &Tracer,
+    options: &BakeOptions,
+    monitor: &dyn Monitor,
+) -> Option<SolveOptions> {
+    monitor.deadline().filter(|_| usual.looked_up && usual.element_size.is_none())?;
+    let mut solve = SolveOptions { cells: options.solve.cells, shown: false, ..*usual };
+    solve.cells_on_path(tracer, CELLS_ON_PATH);
+    (solve.cells < usual.cells).then_some(solve)
 }
 
 /// Solves a scene to an asked error of the irradiance on its surfaces.
@@ -154,10 +162,12 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let stages = Stages::default();
     let paced = Paced::new(monitor, &options.after);
     let monitor: &dyn Monitor = &paced.monitor;
-    let solve = suited(tracer, options, monitor);
+    let usual = suited(tracer, options, monitor);
+    let mut first = hurried(&usual, tracer, options, monitor);
+    let most_rounds = options.rounds + 1 + usize::from(first.is_some());
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
-    monitor.round(1, options.rounds + 1);
-    let mut solution = Solution::new(tracer, &solve, monitor)?;
+    monitor.round(1, most_rounds);
+    let mut solution = Solution::new(tracer, first.as_ref().unwrap_or(&usual), monitor)?;
     let most_paths = most_paths(options.error);
     let watched: Vec<Station> = stations::spread(&solution, options.audit_points, options.seed as u32);
     let places: Vec<_> = watched.iter().map(|s| s.place).collect();
@@ -166,7 +176,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let mut rounds = Vec::new();
     loop {
         // Elements that are only looked up make no field: a picture gathers for those that it shows.
-        let received = if solve.looked_up { solution.indirect_halves()? } else { solution.received(monitor)? };
+        let received = if usual.looked_up { solution.indirect_halves()? } else { solution.received(monitor)? };
         let field = solution.field_of(&received);
         let mut read = |gather: usize| {
             let indirect = if gather == 0 { Indirect::Field(&field) } else { Indirect::Gather { rays: gather } };
@@ -192,10 +202,10 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         // The field does not know contacts below the size of its elements: gathering at each point does, and costs less
         // than elements that small.
         let mut rays = gather_rays(options.error);
-        let first = if solve.looked_up { rays } else { 0 };
-        let (mut seconds, first_read) = pace::timed(|| read(first));
+        let least = if usual.looked_up { rays } else { 0 };
+        let (mut seconds, first_read) = pace::timed(|| read(least));
         let (mut audit, mut reading) = first_read?;
-        rays = rays.max(2 * first);
+        rays = rays.max(2 * least);
         let affordable = SOLUTIONS * solution.rays_in_all() / automatic_texels(tracer.mesh.triangles.len() / 2);
         for doublings in 0.. {
             let is_dear = doublings >= GATHERS && rays as f64 > affordable;
@@ -217,20 +227,23 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let achieved = audit.upper <= options.error;
         // More rounds only while there is something to gain, and memory and leave to gain it with.
         let smaller = solution.element_size / std::f64::consts::SQRT_2;
-        let noisy = !solve.looked_up && solution.field_noise(&received) > 0.5 * options.error;
+        let noisy = !usual.looked_up && solution.field_noise(&received) > 0.5 * options.error;
         let is_given = options.solve.element_size.is_some();
-        let next = SolveOptions {
-            rays: if noisy { 2 * solution.rays() } else { solution.rays() },
-            element_size: Some(if noisy { solution.element_size } else { smaller }),
-            ..solve
+        let next = match first.take() {
+            Some(_) => usual,
+            None => SolveOptions {
+                rays: if noisy { 2 * solution.rays() } else { solution.rays() },
+                element_size: Some(if noisy { solution.element_size } else { smaller }),
+                ..usual
+            },
         };
         let fits = Solution::fits(tracer, &next);
-        let is_last = achieved || rounds.len() > options.rounds || !fits || (is_given && !noisy) || is_stalled(&rounds);
+        let is_last = achieved || rounds.len() >= most_rounds || !fits || (is_given && !noisy) || is_stalled(&rounds);
         // Once begun a round is brought to its end, so that what it replaces may go.
         let out_of_time = !is_last && !has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64());
         let mut ends = is_last || out_of_time;
         if !ends {
-            monitor.round(rounds.len() + 1, options.rounds + 1);
+            monitor.round(rounds.len() + 1, most_rounds);
             begun = Instant::now();
             shadowing.rays *= 2;
             if noisy {

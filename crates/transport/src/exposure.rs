@@ -126,6 +126,8 @@ pub struct Exposure {
     pub buried: usize,
     /// Number of elements that are buried in part.
     pub partial: usize,
+    /// How closely they were examined, if at all.
+    care: Option<Care>,
 }
 
 impl Exposure {
@@ -167,12 +169,13 @@ impl Exposure {
             .collect::<Result<_, _>>()?;
         let masks: FxHashMap<u32, u64> = chunks.into_iter().flatten().collect();
         let buried = masks.values().filter(|m| **m == 0).count();
-        Ok(Exposure { buried, partial: masks.len() - buried, masks })
+        Ok(Exposure { buried, partial: masks.len() - buried, masks, care: Some(care) })
     }
 
-    /// Whether some of an element may be buried.
+    /// Whether some of an element may be buried, of which places are to be asked one by one: those of all elements where contacts were
+    /// not looked at.
     pub fn is_partial(&self, element: u32) -> bool {
-        self.masks.contains_key(&element)
+        self.care.is_none_or(|care| care == Care::Glance) || self.masks.contains_key(&element)
     }
 
     /// Share of an element's area that is exposed.

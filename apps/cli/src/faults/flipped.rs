@@ -1,8 +1,8 @@
 //! Faces that look the other way than their neighbours do.
 //!
 //! Two faces that continue each other walk their common edge in opposite directions. Where both walk it the same way,
-//! one of them shows its black back where its neighbour shows its front. Only edges of exactly two faces are judged:
-//! where more meet, as at a wall that stands on a floor, no pair belongs together.
+//! one of them shows its black back where its neighbour shows its front. Only edges of exactly two faces are judged so:
+//! where more meet, as at a wall that stands on a floor, no pair belongs together, and that is told where it is within an object.
 
 use glam::DVec3;
 use radiosity::{EdgeSide, Mesh, Scene};
@@ -36,9 +36,13 @@ impl Edges {
 pub fn branches(scene: &Scene, mesh: &Mesh, sides: &[EdgeSide]) -> BTreeMap<usize, Edges> {
     let mut found: BTreeMap<usize, Edges> = BTreeMap::new();
     for faces in sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| faces.len() > 2) {
-        let object = |side: &EdgeSide| scene.triangle_object[mesh.source[side.place().0] as usize];
-        if faces.iter().all(|side| object(side) == object(&faces[0])) {
-            found.entry(object(&faces[0]) as usize).or_default().add(mesh, &faces[0]);
+        let mut of_objects: BTreeMap<usize, (usize, &EdgeSide)> = BTreeMap::new();
+        for side in faces {
+            let object = scene.triangle_object[mesh.source[side.place().0] as usize] as usize;
+            of_objects.entry(object).or_insert((0, side)).0 += 1;
+        }
+        for (object, (_, side)) in of_objects.into_iter().filter(|(_, (count, _))| *count > 2) {
+            found.entry(object).or_default().add(mesh, side);
         }
     }
     found

@@ -25,21 +25,23 @@ pub fn find(scene: &Scene, mesh: &Mesh, title: &str, faults: &mut Faults) {
         );
     }
     let place = |object: usize| format!("{title}: object '{}'", scene.objects[object].name);
-    let near = |p: DVec3| format!("near {}", numbers::place(p.to_array()));
+    let first_at = |p: DVec3| format!("the first at {} m", numbers::place(p.to_array()));
     for (object, edges) in flipped::branches(scene, mesh, &sides) {
-        let (edges, near) = (counted(edges.count, "edge joins", "edges join"), near(edges.first));
+        let (edges, at) = (counted(edges.count, "edge joins", "edges join"), first_at(edges.first));
         faults.note(
             place(object),
-            format!("{edges} three faces or more, {near}: surfaces branch there, and which of them continue each other is open"),
+            format!(
+                "{edges} three faces or more, {at}: surfaces branch there, and it is unclear which continue each other"
+            ),
             "harmless where each face looks the way that is meant",
         );
     }
     for (object, edges) in flipped::edges(scene, mesh, &sides) {
-        let (edges, near) = (counted(edges.count, "edge lies", "edges lie"), near(edges.first));
+        let (edges, at) = (counted(edges.count, "edge lies", "edges lie"), first_at(edges.first));
         faults.warning(
             place(object),
             format!(
-                "{edges} between faces that look opposite ways, {near}: one shows its black back beside the other's front"
+                "{edges} between faces that look opposite ways, {at}: one shows its black back beside the other's front"
             ),
             "turn the faces that look the wrong way ('recalculate normals'), or make the material two-sided",
         );

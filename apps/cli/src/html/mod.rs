@@ -115,6 +115,8 @@ fn verdict(report: &Report) -> String {
     } else if error.is_lost_in_writing() {
         let within = percent(error.solution_upper_95_one_sided);
         format!("; {} was asked. The solution itself is within {within}: {}.", percent(asked), error.finer)
+    } else if error.out_of_time {
+        format!("; {} was asked. Allow more time.", percent(asked))
     } else if bounded && error.estimated <= asked {
         format!(
             "; {} was asked. The estimate meets it, but a larger error cannot be excluded: allow more rounds.",

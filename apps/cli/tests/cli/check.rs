@@ -61,13 +61,16 @@ fn check_finds_faces_that_look_the_wrong_way() {
 
     let said = room.run(["check", "turned.obj"]).out;
     assert!(
-        said.contains("warning: turned.obj: object 'cube': 4 edges lie between faces that look opposite ways, near ["),
+        said.contains(
+            "warning: turned.obj: object 'cube': 4 edges lie between faces that look opposite ways, the first at ["
+        ),
         "{said}"
     );
     let fin = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n";
     room.write("fin.obj", fin);
     let said = room.run(["check", "fin.obj"]).out;
-    let told = "note: fin.obj: object 'object': 1 edge joins three faces or more, near [0.5000, 0.0000, 0.0000]";
+    let told =
+        "note: fin.obj: object 'object': 1 edge joins three faces or more, the first at [0.5000, 0.0000, 0.0000] m";
     assert!(said.contains(told), "{said}");
     for good in [&["cube.obj"][..], &["wall.obj"], &["turned.obj", "--obj-double-sided"]] {
         let said = room.run([&["check", "--sky", "uniform:1"], good].concat()).out;

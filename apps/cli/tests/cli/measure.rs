@@ -45,7 +45,7 @@ fn points_outside_the_scene_are_told() {
     assert!(run.err.contains("warning: 2 of 3 points lie outside the scene"), "{}", run.err);
 }
 
-/// A normal into the floor reads no light, and that there is none in the scene would be the wrong reason. Points come by a pipe as well.
+/// A point inside of a block reads no light, and that there is none in the scene would be the wrong reason. Points come by a pipe as well.
 #[test]
 fn points_without_light_are_told_and_levels_summed_up() {
     let room = Room::new("measure-dark");
@@ -60,7 +60,7 @@ fn points_without_light_are_told_and_levels_summed_up() {
     let levels = &result["illuminance"];
     assert!(lux[0] > 0.0 && lux[1] == 0.0 && lux[2] > 0.0, "{lux:?}");
     assert!(levels["least"] == 0.0 && levels["uniformity"] == 0.0 && levels["mean"].as_f64().unwrap() > 1.0);
-    assert!(levels["most"].as_f64() > levels["mean"].as_f64());
+    assert!(levels["largest"].as_f64() > levels["mean"].as_f64());
 
     room.write("p.csv", "x,y,z,nx,ny,nz\n0.2,0.1,0.2,0,1,0\n");
     let run = room.run(["measure", "--points", "p.csv", "--error", "20%"]);

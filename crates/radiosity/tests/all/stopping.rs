@@ -222,6 +222,37 @@ fn a_limit_of_time_ends_the_first_round_of_many_elements() {
     assert!(baked.solution.irradiance().iter().flatten().all(|e| e.is_finite()));
 }
 
+/// Of more triangles than cells a limit of time begins with fewer cells, and comes to as many as usual if it can; as few as those triangles
+/// are anyway, and what meets the error asked is final. No limit begins with all.
+#[test]
+fn a_limit_of_time_begins_with_fewer_cells() {
+    let mut scene = Scene { sky: Sky::Uniform([1000.0; 3]), ..Scene::default() };
+    scene.materials.push(Material::default());
+    let quad = |x: f64, y: f64, side: f64| {
+        [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]].map(|[u, v]| DVec3::new(x + u, 0.0, -y - v))
+    };
+    for i in 0..16 {
+        scene.add_quad("floor", 0, quad(f64::from(i % 4), f64::from(i / 4), 1.0));
+    }
+    scene.add_quad("wall", 0, [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]].map(|[x, y]| DVec3::new(x, y, -4.0)));
+    for i in 0..16_000 {
+        scene.add_quad("tiles", 0, quad(20.0 + 0.01 * f64::from(i % 160), 0.01 * f64::from(i / 160), 0.009));
+    }
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let solve = SolveOptions { rays: 2, ..SolveOptions::default() };
+    let options = BakeOptions { error: 0.5, audit_points: 50, solve, ..BakeOptions::default() };
+    let limit = Duration::from_secs(3600);
+    let hurried = bake(&tracer, &options, &Timed::new(&(), limit)).unwrap();
+    let usual = bake(&tracer, &options, &()).unwrap();
+    let cells = [&hurried, &usual].map(|baked| baked.solution.elements.cells());
+    assert!(hurried.achieved && usual.achieved && 2 * (cells[0] - 32_000) < cells[1] - 32_000, "{cells:?}");
+    // An error that the first round does not meet.
+    let strict = BakeOptions { error: 1e-6, rounds: 0, ..options };
+    let both = bake(&tracer, &strict, &Timed::new(&(), limit)).unwrap();
+    assert_eq!((both.rounds.len(), both.solution.elements.cells()), (2, cells[1]));
+}
+
 /// A limit that is not reached changes nothing but the order of the rays: the error asked is met all the same.
 #[test]
 fn time_that_suffices_gives_the_error_asked() {

@@ -132,7 +132,7 @@ impl Choices {
 /// coordinates. Sheets closer than this block each other no more.
 pub(crate) const TOUCH: f64 = 5e-7;
 
-/// Bytes that a pair takes at most: stored once, and beside it once in each direction.
+/// Bytes that a pair takes at most: stored once, and beside it once in each direction ([`ViewFactors::csr`]).
 const BYTES: usize = 3 * size_of::<(u32, f32, f64)>();
 
 /// Parts of a block: one task, and the pairs that share the first look at the panels.
