@@ -195,19 +195,21 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let files = std::iter::once(target.as_path()).chain(pages.iter().map(PathBuf::as_path)).chain(written);
     let files: Vec<&Path> = files.chain(arguments.report.iter().map(PathBuf::as_path)).collect();
 
-    if !input.scene.sky.is_black() && baked.solution.balance()?.from_sky.iter().all(|flux| *flux == 0.0) {
+    let has_rays = baked.solution.rays() > 0;
+    if has_rays && !input.scene.sky.is_black() && baked.solution.balance()?.from_sky.iter().all(|flux| *flux == 0.0) {
         progress.say(
             "warning: no light of the sky reaches any surface; the model has no opening, or faces look the wrong way",
         );
     }
-    if baked.solution.rays() == 0 && arguments.solve.form_factors.0.is_none() {
+    if !has_rays && arguments.solve.form_factors.0.is_none() {
         progress.say(
-            "warning: there was no time for rays between elements: figures of elements hold a rough guess of what is reflected \
+            "warning: there was no time for rays between elements: figures of elements lack the sky, and guess what is reflected \
              (allow more --time)",
         );
     }
     let written = (&audit, rounds, lightmap, is_hurried);
     let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref(), exposure), written, &files, progress)?;
+    report.error.unlit(&input.scene).iter().for_each(|warning| progress.say(warning));
     for path in &arguments.report {
         let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,
@@ -270,6 +272,7 @@ fn tell(report: &Report, delta_e: Option<f64>, global: &Global, progress: &Progr
         return print(&serde_json::to_string(&event).map_err(Failure::work)?);
     }
     progress.say(&report.error.line());
+    progress.overtime().iter().for_each(|note| progress.say(note));
     if let Some(asked) = delta_e {
         progress.say(&views::nearness(&report.solution.displayed, asked));
     }

@@ -48,9 +48,10 @@ fn strays(scene: &Scene, places: &[(DVec3, DVec3)]) -> Option<String> {
     let is_outside = |p: &DVec3| p.cmplt(low - beside).any() || p.cmpgt(high + beside).any();
     let outside = places.iter().filter(|(p, _)| is_outside(p)).count();
     let [low, high] = [low, high].map(|p| numbers::place(p.to_array()));
+    let lie = if outside == 1 { "lies" } else { "lie" };
     (outside > 0).then(|| {
         format!(
-            "warning: {outside} of {} lie outside the scene, which reaches from {low} to {high} m (are they in its axes and \
+            "warning: {outside} of {} {lie} outside the scene, which reaches from {low} to {high} m (are they in its axes and \
              unit? Of an .obj --up and --unit say which those are; a .glb is in metres, with y up)",
             counted(places.len(), "point", "points")
         )
@@ -67,7 +68,7 @@ fn dark(scene: &Scene, places: &[(DVec3, DVec3)], irradiance: &[Bands]) -> Optio
     let first_at = numbers::place(places[first].0.to_array());
     Some(format!(
         "warning: {count} of {of} {receive} no light at all, the first at {first_at} m: inside a solid, behind a surface, turned \
-         away from all that is lit, or where no ray found any (nx,ny,nz is the way that the sensor looks)"
+         away from all that is lit, or where no ray found any (nx,ny,nz is the way that the sensor looks); it counts as 0"
     ))
 }
 
@@ -168,6 +169,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         return print(&result.to_string());
     }
     progress.say(&error.line());
+    progress.overtime().iter().for_each(|note| progress.say(note));
     progress.say(&levels.to_string());
     if let Some(wrote) = wrote {
         progress.say(&wrote);

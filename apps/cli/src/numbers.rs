@@ -109,7 +109,7 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     let scales = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
     let scaled = scales.iter().find_map(|(unit, scale)| Some((text.strip_suffix(unit)?.trim_end(), *scale)));
     let value = scaled.and_then(|(number, scale)| Some(positive(number).ok()? * scale));
-    let wrong = "use a time with its unit from 1s to 24h, such as 60s or 5min";
+    let wrong = "use a time from 1s to 24h with its unit, s, min or h, such as 60s or 5min";
     value.filter(|s| (1.0..=86_400.0).contains(s)).ok_or_else(|| wrong.to_owned())
 }
 

@@ -16,6 +16,12 @@ const EVERY_MILLISECONDS: u64 = 200;
 const LOG_EVERY_MILLISECONDS: u64 = 60_000;
 const LOG_VERBOSELY_EVERY_MILLISECONDS: u64 = 10_000;
 
+/// Times the time given beyond which that is told.
+const OVERTIME: f64 = 1.1;
+
+/// Seconds of a stage from which on the time that is left of it is told in a line.
+const TELLING_SECONDS: f64 = 1.0;
+
 /// Watches a run for the user.
 pub struct Progress {
     bar: ProgressBar,
@@ -129,6 +135,14 @@ impl Progress {
         self.deadline().is_some_and(|deadline| Instant::now() >= deadline)
     }
 
+    /// What is said where the least that gives an answer took longer than the time that was given.
+    pub fn overtime(&self) -> Option<String> {
+        let (took, limit) = (self.seconds(), f64::from_bits(self.limit.load(Ordering::Relaxed)));
+        (took > OVERTIME * limit).then(|| {
+            format!("note: it took {took:.1} s: the least that gives an answer takes longer here than the {limit:.0} s given by --time")
+        })
+    }
+
     /// Begins a part of the work; the library's own stages count to it.
     pub fn part(&self, name: &str) {
         let mut stage = self.lock();
@@ -205,9 +219,11 @@ impl Progress {
     /// How far a stage has come.
     fn told(&self, done: usize, total: usize) -> String {
         let (name, left) = self.stage_left(done, total);
-        let name = in_round(&name, self.lock().round);
+        let stage = self.lock();
+        let (name, passed) = (in_round(&name, stage.round), stage.since.elapsed().as_secs_f64());
         match 100 * done.min(total) / total.max(1) {
-            0 => format!("{name} has begun"),
+            // Of the first moments nothing follows for the rest.
+            percent if percent == 0 || passed < TELLING_SECONDS => format!("{name} has begun"),
             percent => format!("{name}, {percent} %, {left:.0} s left of this stage"),
         }
     }
@@ -317,11 +333,10 @@ mod tests {
         progress.round(2, 6);
         progress.stage("rays");
         assert_eq!(progress.told(1, 1000), "round 2 of 6 at most: rays has begun");
+        assert_eq!(progress.told(500, 1000), "round 2 of 6 at most: rays has begun");
+        progress.lock().since -= Duration::from_secs(2);
         let told = progress.told(500, 1000);
-        assert!(
-            told.starts_with("round 2 of 6 at most: rays, 50 %, ") && told.ends_with(" s left of this stage"),
-            "{told}"
-        );
+        assert!(told == "round 2 of 6 at most: rays, 50 %, 2 s left of this stage", "{told}");
     }
 
     #[test]

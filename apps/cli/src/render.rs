@@ -73,6 +73,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             ),
         };
     }
+    error.unlit(&input.scene).iter().for_each(|warning| progress.say(warning));
     let shown = baked.solution.displayed(Some(exposure));
     if global.json {
         let result = serde_json::json!({
@@ -82,6 +83,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         return print(&result.to_string());
     }
     progress.say(&error.line());
+    progress.overtime().iter().for_each(|note| progress.say(note));
     if let Some(asked) = arguments.solve.delta_e {
         progress.say(&views::nearness(&shown, asked));
     }

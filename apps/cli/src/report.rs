@@ -2,9 +2,9 @@
 
 use crate::illuminance::Illuminance;
 use crate::progress::Progress;
-use crate::{Failure, figures, input};
+use crate::{Failure, faults, figures, input};
 use radiosity::measure::Round;
-use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Shown, Sky, View, WrittenRound, counted};
+use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Scene, Shown, Sky, View, WrittenRound, counted};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -124,6 +124,13 @@ impl ErrorReport {
         }
     }
 
+    /// What is said where lamps light nothing at all of a scene that has some.
+    pub fn unlit(&self, scene: &Scene) -> Option<&'static str> {
+        (self.points > 0 && self.mean_illuminance == 0.0 && !faults::is_dark(scene)).then_some(
+            "warning: no light reaches any surface: do faces look the wrong way (their backs are black), or are lamps shut in?",
+        )
+    }
+
     /// Whether the solution is good enough and too little of it reached the texels or vertices.
     pub fn is_lost_in_writing(&self) -> bool {
         !self.achieved && self.solution_upper_95_one_sided <= self.asked
@@ -142,7 +149,8 @@ impl ErrorReport {
         let verdict = match (self.achieved, self.out_of_time) {
             (true, _) => "reached",
             (false, true) => "NOT reached in the time given",
-            (false, false) => "NOT reached",
+            (false, false) if self.is_lost_in_writing() => "NOT reached",
+            (false, false) => "NOT reached (allow more --rounds or --memory)",
         };
         let bound = match self.upper_95_one_sided {
             upper if upper.is_finite() => format!("at most {} with 95 % confidence", percent(upper)),
