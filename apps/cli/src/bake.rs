@@ -267,12 +267,12 @@ struct ResultEvent<'a> {
 
 /// The last word: what was reached and where it is.
 fn tell(report: &Report, delta_e: Option<f64>, global: &Global, progress: &Progress) -> Result<(), Failure> {
+    progress.overtime().iter().for_each(|note| progress.say(note));
     if global.json {
         let event = ResultEvent { event: "result", report };
         return print(&serde_json::to_string(&event).map_err(Failure::work)?);
     }
     progress.say(&report.error.line());
-    progress.overtime().iter().for_each(|note| progress.say(note));
     if let Some(asked) = delta_e {
         progress.say(&views::nearness(&report.solution.displayed, asked));
     }

@@ -19,8 +19,8 @@ pub struct Arguments {
     scene: SceneArguments,
     #[command(flatten)]
     solve: SolveArguments,
-    /// Points: a CSV whose first line names the columns x,y,z,nx,ny,nz, such as `1.5,0.75,2,0,1,0`: where, in metres of the
-    /// scene's world, and which way the sensor looks; - reads standard input. `radiosity view` saves its grids and working
+    /// Points: a CSV whose first line names the columns x,y,z,nx,ny,nz and each further one a point, such as `1.5,0.75,2,0,1,0`:
+    /// where, in metres of the scene's world, and which way the sensor looks; - reads standard input. `radiosity view` saves its grids and working
     /// planes like this.
     #[arg(long, value_name = "P.csv")]
     points: PathBuf,
@@ -68,7 +68,7 @@ fn dark(scene: &Scene, places: &[(DVec3, DVec3)], irradiance: &[Bands]) -> Optio
     let first_at = numbers::place(places[first].0.to_array());
     Some(format!(
         "warning: {count} of {of} {receive} no light at all, the first at {first_at} m: inside a solid, behind a surface, turned \
-         away from all that is lit, or where no ray found any (nx,ny,nz is the way that the sensor looks); it counts as 0"
+         away from all that is lit, or where no ray found any (nx,ny,nz is the way that the sensor looks); counted as 0 lx below"
     ))
 }
 
@@ -159,6 +159,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
     let levels = Levels::of(&measured.irradiance);
     let error = ErrorReport::new((&measured.audit, &measured.audit), &arguments.solve, measured.out_of_time);
+    progress.overtime().iter().for_each(|note| progress.say(note));
     if global.json {
         let values: Option<&[radiosity::Bands]> = arguments.output.is_none().then_some(&measured.irradiance);
         let result = serde_json::json!({
@@ -169,7 +170,6 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         return print(&result.to_string());
     }
     progress.say(&error.line());
-    progress.overtime().iter().for_each(|note| progress.say(note));
     progress.say(&levels.to_string());
     if let Some(wrote) = wrote {
         progress.say(&wrote);

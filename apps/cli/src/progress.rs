@@ -139,7 +139,10 @@ impl Progress {
     pub fn overtime(&self) -> Option<String> {
         let (took, limit) = (self.seconds(), f64::from_bits(self.limit.load(Ordering::Relaxed)));
         (took > OVERTIME * limit).then(|| {
-            format!("note: it took {took:.1} s: the least that gives an answer takes longer here than the {limit:.0} s given by --time")
+            format!(
+                "note: it took {took:.1} s, more than the {limit} s given by --time, as the least that gives an answer takes long here, or the \
+                 machine was busy"
+            )
         })
     }
 

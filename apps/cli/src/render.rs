@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
 
     let is_over = baked.out_of_time || view.shadow_rays < render.shadowing.rays || progress.is_over();
     let mut error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
-    if error.is_lost_in_writing() {
+    if error.is_lost_in_writing() && error.upper_95_one_sided.is_finite() {
         let closer = 100.0 * error.asked * error.asked / error.upper_95_one_sided;
         error.finer = match (is_over, closer < LEAST_PERCENT) {
             (true, _) => "allow more --time for the picture".to_owned(),
@@ -75,6 +75,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
     error.unlit(&input.scene).iter().for_each(|warning| progress.say(warning));
     let shown = baked.solution.displayed(Some(exposure));
+    progress.overtime().iter().for_each(|note| progress.say(note));
     if global.json {
         let result = serde_json::json!({
             "event": "result", "error": error, "output": arguments.output, "width": width, "height": height,
@@ -83,7 +84,6 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         return print(&result.to_string());
     }
     progress.say(&error.line());
-    progress.overtime().iter().for_each(|note| progress.say(note));
     if let Some(asked) = arguments.solve.delta_e {
         progress.say(&views::nearness(&shown, asked));
     }

@@ -126,8 +126,8 @@ impl ErrorReport {
 
     /// What is said where lamps light nothing at all of a scene that has some.
     pub fn unlit(&self, scene: &Scene) -> Option<&'static str> {
-        (self.points > 0 && self.mean_illuminance == 0.0 && !faults::is_dark(scene)).then_some(
-            "warning: no light reaches any surface: do faces look the wrong way (their backs are black), or are lamps shut in?",
+        (self.points > 0 && self.mean_illuminance == 0.0 && self.estimated == 0.0 && !faults::is_dark(scene)).then_some(
+            "warning: the audit finds no light on any surface: do faces look the wrong way (their backs are black), or are lamps shut in?",
         )
     }
 
@@ -143,14 +143,14 @@ impl ErrorReport {
         }
         if self.mean_illuminance == 0.0 && self.estimated == 0.0 {
             let places = counted(self.points, "place", "places");
-            return format!("all is black, and the audit finds no light at any of {places}");
+            return format!("the audit finds no light at any of {places}, and the answer has none");
         }
         let percent = |x: f64| format!("{:.3} %", 100.0 * x);
         let verdict = match (self.achieved, self.out_of_time) {
             (true, _) => "reached",
             (false, true) => "NOT reached in the time given",
-            (false, false) if self.is_lost_in_writing() => "NOT reached",
-            (false, false) => "NOT reached (allow more --rounds or --memory)",
+            (false, false) if self.is_lost_in_writing() || self.upper_95_one_sided.is_infinite() => "NOT reached",
+            (false, false) => "NOT reached (allow more --rounds, more --memory or, if given, a smaller --element-size)",
         };
         let bound = match self.upper_95_one_sided {
             upper if upper.is_finite() => format!("at most {} with 95 % confidence", percent(upper)),

@@ -119,8 +119,8 @@ fn split(line: &str, separator: char) -> Vec<String> {
 }
 
 fn point(cells: &[String], columns: [usize; 6], comma: bool) -> Result<Point, (String, &'static str)> {
-    let has_separator = |cell: &str| cell.contains([',', ';', '\t']);
-    let hint = |cell: &str, usual| if has_separator(cell) { "separate columns as the header does" } else { usual };
+    let is_line = |cell: &str| cell.split([',', ';', '\t']).count() > 2;
+    let hint = |cell: &str, usual| if is_line(cell) { "separate columns as the header does" } else { usual };
     let mut values = [0.0; 6];
     for ((value, column), name) in values.iter_mut().zip(columns).zip(["x", "y", "z", "nx", "ny", "nz"]) {
         let Some(text) = cells.get(column) else {

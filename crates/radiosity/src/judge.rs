@@ -157,8 +157,7 @@ impl<'b, 'a> Judge<'b, 'a> {
             return Ok(1.0);
         }
         let (some, parts) = pace::sample(&self.more);
-        self.thinned = 1.0;
-        let least = (FEW_RAYS / self.rays().0.max(1) as f64).min(LEAST_PART);
+        let least = (FEW_RAYS / self.rays_of(1.0).0.max(1) as f64).min(LEAST_PART);
         let mut times = [(0.0, 0.0); 2];
         for (time, thinned) in times.iter_mut().zip([least, TIMED * least]) {
             self.thinned = thinned;
@@ -248,11 +247,16 @@ impl<'b, 'a> Judge<'b, 'a> {
 
     /// Gather rays and shadow rays of a vertex, or of all further points of a texel.
     fn rays(&self) -> (usize, u32) {
+        self.rays_of(self.thinned)
+    }
+
+    /// The same with such a part of them.
+    fn rays_of(&self, part: f64) -> (usize, u32) {
         let [gather, shadow] = match self.written {
             Written::Vertices => [self.gather, self.shadowing.rays as usize],
             Written::Texels => usual_rays(self.baked.error),
         };
-        (thinned(gather, self.thinned), thinned(shadow, self.thinned) as u32)
+        (thinned(gather, part), thinned(shadow, part) as u32)
     }
 
     /// Shadow rays of each of so many points.
@@ -275,7 +279,7 @@ impl<'b, 'a> Judge<'b, 'a> {
             let plain = |auditor: &Auditor| auditor.judge(&read_back);
             let audit = certify(&mut self.auditor, &plain, *error, paths, stages, monitor)?;
             // Places do not share what they gather, and so have more rays.
-            let takes = self.each * (self.more.len() * (self.gather / self.rays().0.max(1)).max(1)) as f64;
+            let takes = self.each * (self.more.len() * (self.gather / self.rays_of(1.0).0.max(1)).max(1)) as f64;
             if audit.upper <= *error || !achieved || !self.or_hurried(has_time(monitor, takes)) {
                 return Ok(audit);
             }

@@ -24,7 +24,7 @@ pub struct MeasureOptions {
     pub solve: SolveOptions,
     /// Points that the referee examines.
     pub audit_points: usize,
-    /// Rounds of refinement at most.
+    /// Rounds of refinement at most; as many more as come to a finer error than the first one within a time limit is made for.
     pub rounds: usize,
     /// Seed of the audit.
     pub seed: u64,
@@ -237,6 +237,8 @@ pub fn measure(
     let [most, at_one_percent] = LOOKED_UP_CELLS;
     solve.cells = solve.cells.max((crowd.cells * (at_one_percent * 0.01 / begun_for).min(most)) as usize);
     solve.cells_on_path(tracer, CELLS_ON_PATH);
+    let least_variation = VARIATION * options.error / crowd.cells.sqrt();
+    let most_rounds = options.rounds + 1 + (begun_for / options.error).log2().ceil() as usize;
     solve.variation = solve.variation.min(VARIATION * begun_for / crowd.cells.sqrt());
     solve.suit_method();
     solve.fit(tracer, monitor);
@@ -244,7 +246,7 @@ pub fn measure(
         Some(_) => FEWEST,
         None => std::array::from_fn(|k| rays_for(options.error, FIRST_RAYS[k], FEWEST[k], MOST_FIRST)),
     };
-    monitor.round(1, options.rounds + 1);
+    monitor.round(1, most_rounds);
     let mut solving = Instant::now();
     let mut solution = Solution::new(tracer, &solve, monitor)?;
     let mut solution_takes = solving.elapsed().as_secs_f64();
@@ -274,7 +276,7 @@ pub fn measure(
         let irradiance = light.irradiance();
         let watched: Vec<Bands> = watched.iter().map(|&i| irradiance[i]).collect();
         // Where no better answer follows, this one is looked at as closely as it takes.
-        let is_final = rounds.len() >= options.rounds;
+        let is_final = rounds.len() + 1 >= most_rounds;
         let target = (options.error, if is_final { Audit::is_above } else { is_hopeless as fn(&Audit, f64) -> bool });
         let judge = |auditor: &Auditor| auditor.judge(&watched);
         let audit = certify_unless(&mut auditor, &judge, target, most_paths, &stages, monitor)?;
@@ -295,9 +297,9 @@ pub fn measure(
         // A finer solution need not be a better one, and a time limit may have left too little for its points.
         let answer = answer.or_better(best.take());
         let alone = options.solve.element_size.is_some() || solved % 2 == 1;
-        let next = if plan.solves_again { finer(&solve, solution.rays(), alone) } else { solve };
+        let next = if plan.solves_again { finer(&solve, solution.rays(), alone, least_variation) } else { solve };
         let is_last = answer.achieved
-            || rounds.len() > options.rounds
+            || rounds.len() >= most_rounds
             || places.is_empty()
             || is_stalled(&rounds)
             || !Solution::fits(tracer, &next);
@@ -311,7 +313,7 @@ pub fn measure(
             let out_of_time = !answer.achieved && (out_of_time || is_over(monitor));
             return Ok(Measurement { out_of_time, rounds, stages, ..answer });
         }
-        monitor.round(rounds.len() + 1, options.rounds + 1);
+        monitor.round(rounds.len() + 1, most_rounds);
         noise_asked = plan.noise;
         if plan.solves_again {
             solving = Instant::now();
@@ -403,12 +405,13 @@ impl Plan {
 }
 
 /// How to solve for less error than a solution with so many rays has: with twice as many, and with smaller elements and more places on
-/// each that look at lights, unless with rays `alone`.
-fn finer(solve: &SolveOptions, rays: usize, alone: bool) -> SolveOptions {
+/// each that look at lights, where light varies less if it may, unless with rays `alone`.
+fn finer(solve: &SolveOptions, rays: usize, alone: bool, least_variation: f64) -> SolveOptions {
     let mut next = SolveOptions { rays: 2 * rays, ..*solve };
     if !alone {
         next.element_size = solve.element_size.map(|size| size / std::f64::consts::SQRT_2);
         next.shadowing.places *= 2;
+        next.variation = solve.variation.min((0.5 * solve.variation).max(least_variation));
     }
     next
 }

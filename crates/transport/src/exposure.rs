@@ -391,6 +391,22 @@ mod tests {
         }
     }
 
+    /// Where contacts were not looked at, every place is to be asked: texels beneath a pile were taken for seen, and black.
+    #[test]
+    fn who_did_not_look_at_contacts_has_all_places_asked() {
+        let mut scene = Scene::default();
+        scene.materials.push(Material::default());
+        add_box(&mut scene, "alone", [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], false);
+        let mesh = Mesh::new(&scene);
+        let (tracer, elements) = (Tracer::new(&scene, &mesh), Elements::new(&scene, &mesh, 0.5));
+        let partial = |exposure: &Exposure| (0..elements.len() as u32).filter(|e| exposure.is_partial(*e)).count();
+        assert_eq!(partial(&Exposure::default()), elements.len());
+        for (care, expected) in [(Care::Glance, elements.len()), (Care::Contacts, 0), (Care::Full, 0)] {
+            let exposure = Exposure::with_care(care, &tracer, (&mesh, &elements), &()).unwrap();
+            assert_eq!(partial(&exposure), expected, "{care:?}");
+        }
+    }
+
     /// Solids that touch each other show the places inside them each other's fronts, which say nothing.
     #[test]
     fn what_lies_inside_a_pile_or_a_row_is_buried() {

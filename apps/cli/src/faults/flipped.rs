@@ -32,12 +32,13 @@ impl Edges {
     }
 }
 
-/// Edges of each object at which three faces of it or more meet, from the sides of all edges.
+/// Edges of each object at which three one-sided faces of it or more meet, from the sides of all edges.
 pub fn branches(scene: &Scene, mesh: &Mesh, sides: &[EdgeSide]) -> BTreeMap<usize, Edges> {
     let mut found: BTreeMap<usize, Edges> = BTreeMap::new();
     for faces in sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| faces.len() > 2) {
         let mut of_objects: BTreeMap<usize, (usize, &EdgeSide)> = BTreeMap::new();
-        for side in faces {
+        let one_sided = |side: &&EdgeSide| !scene.material(mesh.source[side.place().0] as usize).has_two_sides();
+        for side in faces.iter().filter(one_sided) {
             let object = scene.triangle_object[mesh.source[side.place().0] as usize] as usize;
             of_objects.entry(object).or_insert((0, side)).0 += 1;
         }

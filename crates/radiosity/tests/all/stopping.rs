@@ -253,7 +253,7 @@ fn a_limit_of_time_begins_with_fewer_cells() {
     assert_eq!((both.rounds.len(), both.solution.elements.cells()), (2, cells[1]));
 }
 
-/// A limit that is not reached changes nothing but the order of the rays: the error asked is met all the same.
+/// Of few triangles a limit that is not reached changes nothing but the order of the rays: the error asked is met all the same.
 #[test]
 fn time_that_suffices_gives_the_error_asked() {
     struct Stages(std::sync::Mutex<Vec<String>>);
