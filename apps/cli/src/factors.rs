@@ -52,8 +52,8 @@ pub struct Arguments {
     /// Length of one unit of a .vs3 or .obj: m (the default), cm, mm, in, ft, or a number of metres.
     #[arg(long, value_name = "UNIT", allow_negative_numbers = true, value_parser = numbers::unit)]
     unit: Option<f64>,
-    /// Memory for the factors, e.g. 4G or 500M; powers of 1024. What finds them takes more beside it: a few hundred MB where
-    /// thousands of surfaces stand between others.
+    /// Memory for the factors, e.g. 4G or 500M; powers of 1024. What finds them takes more beside it: a gigabyte where
+    /// tens of thousands of surfaces stand between others.
     #[arg(long, default_value = "4G", value_name = "BYTES", allow_hyphen_values = true, value_parser = numbers::bytes)]
     memory: usize,
 }

@@ -20,8 +20,8 @@ pub struct Arguments {
     #[command(flatten)]
     solve: SolveArguments,
     /// Points: a CSV whose first line names the columns x,y,z,nx,ny,nz and each further one a point, such as `1.5,0.75,2,0,1,0`:
-    /// where, in metres of the scene's world, and which way the sensor looks; - reads standard input. `radiosity view` saves its grids and working
-    /// planes like this.
+    /// where, in metres of the scene's world, and which way the sensor looks; - reads standard input. `radiosity view` saves its
+    /// grids and working planes like this.
     #[arg(long, value_name = "P.csv")]
     points: PathBuf,
     /// The answer: the points with irradiance_r,irradiance_g,irradiance_b,illuminance_lux and the further columns of

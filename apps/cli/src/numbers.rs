@@ -65,6 +65,9 @@ pub fn angle(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| "use degrees from 1 to 170".to_owned())
 }
 
+/// The least relative error that can be asked for: that of single precision is not far below.
+pub const LEAST_ERROR: f64 = 1e-4;
+
 /// A relative error. A bare 1 is refused, as it may mean 1 % or all of it.
 pub fn error(text: &str) -> Result<f64, String> {
     let value = match text.strip_suffix('%') {
@@ -72,7 +75,7 @@ pub fn error(text: &str) -> Result<f64, String> {
         Some(number) => positive(&format!("{}e-2", number.trim_end())),
         None => positive(text).and_then(|x| if x < 1.0 { Ok(x) } else { Err(String::new()) }),
     };
-    value.ok().filter(|x| (1e-4..=1.0).contains(x)).ok_or_else(|| {
+    value.ok().filter(|x| (LEAST_ERROR..=1.0).contains(x)).ok_or_else(|| {
         "use a percentage from 0.01% to 100%, such as 1%, or a fraction below 1, such as 0.01".to_owned()
     })
 }

@@ -24,9 +24,6 @@ pub struct Arguments {
     picture: PictureArguments,
 }
 
-/// The least error that can be asked for, percent.
-const LEAST_PERCENT: f64 = 0.01;
-
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let mut outputs = Outputs::new(&arguments.scene.files());
@@ -63,13 +60,13 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let is_over = baked.out_of_time || view.shadow_rays < render.shadowing.rays || progress.is_over();
     let mut error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
     if error.is_lost_in_writing() && error.upper_95_one_sided.is_finite() {
-        let closer = 100.0 * error.asked * error.asked / error.upper_95_one_sided;
-        error.finer = match (is_over, closer < LEAST_PERCENT) {
+        let closer = error.asked * error.asked / error.upper_95_one_sided;
+        error.finer = match (is_over, closer < numbers::LEAST_ERROR) {
             (true, _) => "allow more --time for the picture".to_owned(),
             (false, true) => "the camera looks at harder places than there are on the whole".to_owned(),
             (false, false) => format!(
                 "the camera looks at harder places than there are on the whole; --error {}% comes nearer",
-                numbers::rough(closer)
+                numbers::rough(100.0 * closer)
             ),
         };
     }

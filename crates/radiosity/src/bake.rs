@@ -140,8 +140,9 @@ fn suited(tracer: &Tracer, options: &BakeOptions, monitor: &dyn Monitor) -> Solv
     solve
 }
 
-/// How a scene is solved at first within a time limit, if it is not as usual: elements that are only looked up are as few as may be. With as many as usual from the beginning, an office of 84,000 triangle
-/// sides is 29 % off after 6 s, and 14 % after 11 s; so 18 % after 6 s, and 8 % after 10 s.
+/// How a scene is solved at first within a time limit, if it is not as usual: elements that are only looked up are as few as may
+/// be. With as many as usual from the beginning, an office of 84,000 triangle sides is 29 % off after 6 s, and 14 % after 11 s; so
+/// 18 % after 6 s, and 8 to 10 % after 10 s.
 fn hurried(
     usual: &SolveOptions,
     tracer: &Tracer,
