@@ -7,8 +7,7 @@ use crate::report::ErrorReport;
 use crate::{Failure, Global, faults, numbers};
 use clap::Args;
 use glam::DVec3;
-use radiosity::{Bands, Scene, Tracer, counted, luminance};
-use serde::Serialize;
+use radiosity::{Bands, Levels, Scene, Tracer, counted, luminance};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -72,35 +71,6 @@ fn dark(scene: &Scene, places: &[(DVec3, DVec3)], irradiance: &[Bands]) -> Optio
     ))
 }
 
-/// Illuminance of the points, lx, as lighting is planned by.
-#[derive(Clone, Copy, Debug, Serialize)]
-struct Levels {
-    mean: f64,
-    least: f64,
-    largest: f64,
-    /// Least over mean.
-    uniformity: f64,
-}
-
-impl Levels {
-    fn of(irradiance: &[Bands]) -> Levels {
-        let lux = || irradiance.iter().map(|e| f64::from(luminance(*e)));
-        let mean = lux().sum::<f64>() / irradiance.len().max(1) as f64;
-        let [least, largest] = [lux().fold(f64::INFINITY, f64::min), lux().fold(0.0, f64::max)];
-        Levels { mean, least, largest, uniformity: if mean > 0.0 { least / mean } else { 0.0 } }
-    }
-}
-
-impl std::fmt::Display for Levels {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        let Levels { mean, least, largest, uniformity } = self;
-        write!(
-            f,
-            "mean {mean:.4} lx, least {least:.4}, largest {largest:.4}, uniformity {uniformity:.3} (least over mean)"
-        )
-    }
-}
-
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let mut inputs = arguments.scene.files();
@@ -157,7 +127,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     if let Some(warning) = dark(&input.scene, &places, &measured.irradiance) {
         progress.say(&warning);
     }
-    let levels = Levels::of(&measured.irradiance);
+    let levels = Levels::of(measured.irradiance.iter().map(|e| luminance(*e)));
     let error = ErrorReport::new((&measured.audit, &measured.audit), &arguments.solve, measured.out_of_time);
     progress.overtime().iter().for_each(|note| progress.say(note));
     if global.json {

@@ -11,6 +11,7 @@
 use super::rectangle::{axes_along, cells, extent, is_within};
 use super::survey::Meter;
 use super::{ObjectId, Session};
+use crate::Levels;
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
@@ -425,10 +426,8 @@ impl Session {
             return Err(PlaneError::NoPoint);
         }
         let count = points.len() as f64;
-        let mean = points.iter().map(|point| f64::from(point.lux)).sum::<f64>() / count;
         let square = points.iter().map(|point| f64::from(point.error).powi(2)).sum::<f64>() / count;
-        let least = points.iter().map(|point| point.lux).fold(f32::INFINITY, f32::min);
-        let over = |x: f64| if mean > 0.0 { (x / mean) as f32 } else { 0.0 };
+        let Levels { mean, least, largest, uniformity } = Levels::of(points.iter().map(|point| point.lux));
         let covered = plane.cells.iter().zip(&is_reached).filter(|of| of == &(&Cell::Inside, &true)).count();
         let above = plane.cells.iter().filter(|cell| **cell != Cell::Outside).count();
         let figures = PlaneFigures {
@@ -436,14 +435,14 @@ impl Session {
             cell: layout.cell.to_array(),
             axes: layout.axes.map(|axis| axis.to_array()),
             is_coarse: layout.is_coarse,
-            least,
+            least: least as f32,
             mean: mean as f32,
-            most: points.iter().map(|point| point.lux).fold(0.0, f32::max),
-            uniformity: over(f64::from(least)),
+            most: largest as f32,
+            uniformity: uniformity as f32,
             covered,
             walled,
             beyond: above - points.len() - covered - walled,
-            error: over(square.sqrt()),
+            error: if mean > 0.0 { (square.sqrt() / mean) as f32 } else { 0.0 },
         };
         Ok(PlaneReading { points, figures })
     }
