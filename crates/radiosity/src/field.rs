@@ -2,7 +2,7 @@
 //! noise where it is looked at.
 
 use crate::measure::brought_nothing;
-use crate::monitor::{Monitor, Watch, is_over};
+use crate::monitor::{Monitor, Watch};
 use crate::pace;
 use crate::{Error, Solution};
 use glam::DVec3;
@@ -20,7 +20,7 @@ const FLAT: f64 = 0.99996;
 /// Fewest rays that gather for an element of a divided cell: what is left of 128 for the smallest of 16.
 const FEWEST_RAYS: usize = 8;
 
-/// Rays that gather for a cell that is looked at are doubled up to this: half a minute for 15,000 cells.
+/// Rays that gather for a cell that is looked at at most: half a minute for 15,000 cells.
 const MOST_RAYS: usize = 4096;
 
 /// Rays that each cell that is looked at gathers with, however little time there is: elements that are looked up alone may have sixteen
@@ -30,8 +30,18 @@ const LEAST_SEEN: usize = 64;
 /// Noise that is seen on a smooth wall, relative to its light: pictures have no more, whatever error is asked for.
 const VISIBLE: f64 = 0.01;
 
+/// Rays by which a pass has more of them: between a quarter of those so far, as it is judged anew, and as many, as its noise is told roughly.
+const MORE: [usize; 2] = [4, 1];
+
 /// An element, and the unit normals at its corners that it receives with.
 type Shaded = (u32, [DVec3; 3]);
+
+/// Rays that bring the noise of those that cells had, so many times as much as is wanted, down to that: it falls with their root at least.
+fn further(had: usize, over: f64) -> usize {
+    let [least, most] = MORE.map(|part| had / part);
+    let wanted = had as f64 * (over * over - 1.0);
+    (wanted.min(most as f64) as usize).max(least).next_multiple_of(FEWEST_RAYS)
+}
 
 impl Solution<'_> {
     /// The continuous field of the indirect irradiance.
@@ -63,12 +73,12 @@ impl Solution<'_> {
             // Half of the time at most: an audit follows.
             rays = pace::leap(LEAST_SEEN, rays as f64, 0.5 * left, each).unwrap_or(LEAST_SEEN).min(rays);
         }
-        self.gather_on(&curved, rays, &mut light, monitor)?;
+        self.gather_on(&curved, (rays, 0), &mut light, monitor)?;
         Ok(light)
     }
 
     /// The field of `light` by element, in halves, where cells are looked at, each as often as `looks` says. Where its noise
-    /// there is more than `error`, or than is visible, these and what is around them gather anew with twice the rays, until
+    /// there is more than `error`, or than is visible, these and what is around them gather anew, with more rays until
     /// it is not, or that brings nothing, or there are 4,096 for each cell.
     ///
     /// # Errors
@@ -87,36 +97,42 @@ impl Solution<'_> {
         let elements = (0..around.len()).filter(|cell| around[*cell]).flat_map(|cell| self.elements.of_cell(cell));
         let seen: Vec<Shaded> = elements.map(|element| (element, self.shading_normals(element))).collect();
         let noise = |light: &[[Bands; 2]]| self.noise(light, |cell, _| f64::from(looks[cell]));
-        let mut noises = vec![noise(&light)];
-        let mut rays = 2 * self.rays();
+        let (wanted, first) = (error.min(VISIBLE), 2 * self.rays());
         // Within a time limit, seconds for each ray.
-        let mut each = match pace::left(monitor) {
-            Some(_) => Some(self.seconds_to_gather(&seen, rays.min(LEAST_SEEN), &light, monitor)?),
+        let each = match pace::left(monitor) {
+            Some(_) => Some(self.seconds_to_gather(&seen, first.min(LEAST_SEEN), &light, monitor)?),
             None => None,
         };
-        if each.is_some() && is_over(monitor) && rays <= LEAST_SEEN {
-            self.gather_on(&seen, LEAST_SEEN, &mut light, monitor)?;
-        }
-        while noises.last().is_some_and(|last| *last > error.min(VISIBLE))
-            && rays <= MOST_RAYS
+        let mut noises = vec![noise(&light)];
+        // Rays of each cell so far; those that the light came with are left out.
+        let mut had = 0;
+        while let Some(&last) = noises.last().filter(|last| **last > wanted)
+            && had < MOST_RAYS
             && !brought_nothing(&noises)
-            && !is_over(monitor)
         {
-            if let (Some(each), Some(left), [.., last]) = (each, pace::left(monitor), noises.as_slice()) {
-                // Noise falls with the root of the rays at least: no more of them are wanted at once than would do then.
-                let wanted = 0.5 * rays as f64 * (last / error.min(VISIBLE)).powi(2);
-                let next = pace::leap(rays, wanted.min(MOST_RAYS as f64), left, each);
-                // The least is gathered in any case, once.
-                match next.or((noises.len() == 1 && rays <= LEAST_SEEN).then_some(LEAST_SEEN)) {
-                    Some(next) => rays = next,
-                    None => break,
+            let [least, mut rays] = match had {
+                0 => [first, first],
+                _ => [had / MORE[0], further(had, last / wanted)].map(|rays| rays.min(MOST_RAYS - had)),
+            };
+            if let (Some(each), Some(left)) = (each, pace::left(monitor)) {
+                let affordable = pace::affordable(left, each);
+                rays = match affordable >= least {
+                    true => rays.min(affordable),
+                    // The least is gathered in any case, once.
+                    false if had == 0 && first <= LEAST_SEEN => LEAST_SEEN,
+                    false => break,
+                };
+            }
+            let mut more = light.clone();
+            self.gather_on(&seen, (rays, noises.len() as u32 - 1), &mut more, monitor)?;
+            let share = rays as f32 / (had + rays) as f32;
+            for element in seen.iter().map(|(element, _)| *element as usize) {
+                for (all, more) in light[element].iter_mut().flatten().zip(more[element].iter().flatten()) {
+                    *all += share * (more - *all);
                 }
             }
-            let (took, gathered) = pace::timed(|| self.gather_on(&seen, rays, &mut light, monitor));
-            gathered?;
-            each = each.map(|_| took / rays as f64);
+            had += rays;
             noises.push(noise(&light));
-            rays *= 2;
         }
         Ok(self.field_of(&light))
     }
@@ -131,7 +147,7 @@ impl Solution<'_> {
     ) -> Result<f64, Error> {
         let (some, parts) = pace::sample(elements);
         let mut thrown_away = light.to_vec();
-        let (seconds, gathered) = pace::timed(|| self.gather_on(&some, rays, &mut thrown_away, monitor));
+        let (seconds, gathered) = pace::timed(|| self.gather_on(&some, (rays, 0), &mut thrown_away, monitor));
         gathered?;
         Ok(parts * seconds / rays as f64)
     }
@@ -184,11 +200,11 @@ impl Solution<'_> {
         (noise / sum.max(f64::MIN_POSITIVE)).sqrt()
     }
 
-    /// Puts what elements gather with `rays` rays per cell into `light`.
+    /// Puts what elements gather with `rays` rays per cell into `light`; each `salt` has rays of its own.
     fn gather_on(
         &self,
         elements: &[Shaded],
-        rays: usize,
+        (rays, salt): (usize, u32),
         light: &mut [[Bands; 2]],
         monitor: &dyn Monitor,
     ) -> Result<(), Error> {
@@ -199,7 +215,7 @@ impl Solution<'_> {
             by_pieces.entry(self.elements.pieces(element.0)).or_default().push(*element);
         }
         for (pieces, shaded) in &by_pieces {
-            let receivers = ShadedReceivers { all: &all, shaded };
+            let receivers = ShadedReceivers { all: &all, shaded, salt };
             let rays = (rays / *pieces as usize).max(FEWEST_RAYS);
             let gather = || self.gather().irradiance(&receivers, rays, &Watch(monitor));
             for ((element, _), halves) in shaded.iter().zip(self.stages.time(monitor, "gather on surfaces", gather)?) {

@@ -35,6 +35,7 @@ mod mean_path;
 pub mod measure;
 mod monitor;
 mod pace;
+mod pixels;
 mod points;
 mod preview;
 pub mod render;

@@ -52,6 +52,11 @@ impl Cost {
 }
 
 impl Cost {
+    /// What a part of the work takes.
+    pub fn of(&self, part: f64) -> Cost {
+        Cost { fixed: part * self.fixed, each: part * self.each }
+    }
+
     /// The part of the work with so many rays that seconds suffice for, with some left over.
     pub fn part(&self, seconds: f64, rays: f64) -> f64 {
         (SURE * seconds / self.seconds(rays).max(f64::MIN_POSITIVE)).min(1.0)
@@ -61,6 +66,11 @@ impl Cost {
 /// Whether so many seconds are sure to do for what is expected to take `needed`.
 pub(crate) fn suffices(seconds: f64, needed: f64) -> bool {
     needed <= SURE * seconds
+}
+
+/// Rays that seconds suffice for with `each` for a ray, with some left over.
+pub(crate) fn affordable(seconds: f64, each: f64) -> usize {
+    (SURE * seconds / each.max(f64::MIN_POSITIVE)) as usize
 }
 
 /// Rays of the next of passes that begin anew, each with twice the rays of the one before as long as there is no hurry: of these
@@ -115,8 +125,9 @@ pub(crate) struct Reading {
     pub audit: f64,
 }
 
-/// Shadow rays of a pixel, and what cells that are seen gather beside them takes, relative to them, about.
-const PIXEL: (f64, f64) = (256.0, 1.0);
+/// Shadow rays of a pixel in the mean, as light is found at half of them at most, and what cells that are seen gather beside them
+/// takes, relative to them, about.
+const PIXEL: (f64, f64) = (128.0, 2.0);
 
 /// What edges take beside all texels, about.
 pub(crate) const EDGES: f64 = 0.5;

@@ -86,7 +86,7 @@ impl Glimpse {
             (0..elements.len() as u32).filter(|e| stands_for[*e as usize] > 0.0).map(flat).collect();
         let exposure = Exposure::default();
         let all = ElementReceivers { mesh, elements: &elements, exposure: &exposure };
-        let receivers = ShadedReceivers { all: &all, shaded: &asked };
+        let receivers = ShadedReceivers { all: &all, shaded: &asked, salt: 0 };
         let columns = luminaires.columns(tracer, &receivers, &options.shadowing, &Watch(monitor))?;
 
         // What arrives at a sheet leaves it on both sides. Only direct light has to be asked for; the rest is known of all.

@@ -1,16 +1,17 @@
-//! A picture of a solution: direct light evaluated for each pixel, indirect light from the continuous field.
+//! A picture of a solution: direct light found at places that pixels show ([`crate::pixels`]), indirect light from the continuous field.
 
-use crate::answer::{Station, read};
+use crate::answer::Station;
 use crate::measure::{certify, most_paths};
 use crate::monitor::{Monitor, Timed};
 use crate::pace::{self, Cost};
-use crate::{Baked, Error, Indirect, Solution};
-use radiosity_scene::{Bands, Camera, Side, luminance};
+use crate::pixels::Tiles;
+use crate::{Baked, Error, Solution};
+use radiosity_scene::{Bands, Camera, luminance};
 use radiosity_trace::Place;
 use radiosity_trace::sampling::{hash, unit};
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor, Picture, ViewRays};
-use std::collections::HashMap;
+use rayon::prelude::*;
 use std::time::Duration;
 
 /// How to make a picture.
@@ -20,7 +21,7 @@ pub struct RenderOptions {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Shadow rays per pixel, over all lights; with 128 walls near a lamp are sandy.
+    /// Shadow rays for each place at which direct light is found, over all lights; with 128 walls near a lamp are sandy.
     pub shadowing: Shadowing,
 }
 
@@ -41,10 +42,6 @@ const FEWEST_SAMPLES: u32 = 2;
 
 /// By how much smaller along each side a picture is that tells how long its rays take.
 const SMALLER: u32 = 16;
-
-/// Pixels along a side of the squares whose pixels share their direct light where the fewest rays are too many still: most of what a
-/// pixel takes goes to finding what its lights would give. Wider ones make stairs of shadows' edges that one sees.
-const SQUARE: u32 = 2;
 
 /// Shadow rays that a part of the pixels is timed with: enough to tell what each takes.
 const TIMED_SHADOW_RAYS: u32 = 64;
@@ -101,36 +98,44 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
             looks[solution.elements.cell(element)] += 1;
         }
     }
-    let mut shadowing = options.shadowing;
     let light = baked.received.clone();
-    let (field, enough) = match pace::left(monitor) {
-        None => (solution.field_on(&looks, light, baked.error, monitor)?, true),
-        Some(_) => {
-            let after = SEEN * baked.audit_seconds() + ENCODED * cast;
-            let asked = f64::from(options.shadowing.rays);
-            let left = || pace::left(monitor).map_or(0.0, |left| (left - after).max(0.0));
-            let lit = cost(solution, &stations, &options.shadowing, monitor)?.seconds(asked);
-            let gather = (left() - lit).max(GATHERED * left());
-            let within = Timed::new(monitor, Duration::from_secs_f64(gather));
-            let field = solution.field_on(&looks, light, baked.error, &within)?;
-            // Timed once more: others may have come or gone since.
-            let least = f64::from(LEAST_SHADOW_RAYS.min(options.shadowing.rays));
-            let cost = cost(solution, &stations, &options.shadowing, monitor)?;
-            shadowing.rays = cost.rays(left(), [least, asked]) as u32;
-            (field, cost.part(left(), least) >= 1.0)
+    let after = SEEN * baked.audit_seconds() + ENCODED * cast;
+    let left = || pace::left(monitor).map(|left| (left - after).max(0.0));
+    let tiles = Tiles::new(&view);
+    let field = match left() {
+        None => solution.field_on(&looks, light, baked.error, monitor)?,
+        Some(seconds) => {
+            let lit = cost(solution, &stations, &options.shadowing, monitor)?;
+            let lit = tiles.part() * lit.seconds(f64::from(options.shadowing.rays));
+            let gather = (seconds - lit).max(GATHERED * seconds);
+            solution.field_on(&looks, light, baked.error, &Timed::new(monitor, Duration::from_secs_f64(gather)))?
         }
     };
-    let answer = if enough {
-        solution.at(&stations, Indirect::Field(&field), &shadowing, monitor)?
-    } else {
-        let (own, of) = squares(&view, SQUARE);
-        let places: Vec<Place> = own.iter().map(|&i| stations[i].place).collect();
-        let lit = solution.direct_at(&places, &shadowing, monitor)?;
-        read(&stations, of.into_iter().map(|k| lit[k]).collect(), &field)
-    };
+    let received = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
+    let indirect: Vec<Bands> = stations.par_iter().map(received).collect();
+    // Timed once more: others may have come or gone since.
+    let cost = left().map(|_| cost(solution, &stations, &options.shadowing, monitor)).transpose()?;
+    let mut shadowing = options.shadowing;
+    let mut is_first = true;
+    let direct = tiles.direct(&indirect, |own| {
+        if let (Some(cost), Some(seconds)) = (&cost, left()) {
+            // All that follows is planned with the first ones.
+            let part = if is_first { tiles.part() } else { own.len() as f64 / stations.len() as f64 };
+            let (cost, least) = (cost.of(part), LEAST_SHADOW_RAYS.min(shadowing.rays));
+            if !is_first && !pace::suffices(seconds, cost.seconds(f64::from(least))) {
+                return Ok(None);
+            }
+            shadowing.rays = cost.rays(seconds, [least, shadowing.rays].map(f64::from)) as u32;
+        }
+        is_first = false;
+        let places: Vec<Place> = own.iter().map(|place| stations[*place as usize].place).collect();
+        Ok(Some((solution.direct_by(&places, &shadowing, 0, monitor)?, shadowing.rays)))
+    })?;
+    let both = |(h, d): (&Bands, &Bands)| std::array::from_fn(|band| h[band] + d[band]);
+    let irradiance: Vec<Bands> = indirect.iter().zip(&direct).map(both).collect();
     let pixels = view.own.len();
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
-    for (seen, e) in view.seen.iter().zip(&answer.irradiance) {
+    for (seen, e) in view.seen.iter().zip(&irradiance) {
         let (pixel, response) = (seen.pixel as usize, luminance(seen.response));
         if response > share[pixel] && !seen.behind {
             (share[pixel], illuminance[pixel]) = (response, luminance(*e));
@@ -142,8 +147,8 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         let jitter = f64::from(unit(hash(baked.seed ^ hash(i as u32))));
         ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
     };
-    let watched = (0..count).map(pick).map(|i| (stations[i].place, answer.irradiance[i])).collect();
-    Ok(View { picture: view.picture(&answer.irradiance), illuminance, watched, shadow_rays: shadowing.rays })
+    let watched = (0..count).map(pick).map(|i| (stations[i].place, irradiance[i])).collect();
+    Ok(View { picture: view.picture(&irradiance), illuminance, watched, shadow_rays: shadowing.rays })
 }
 
 /// Casts the camera's rays, fewer of them where a small picture tells that they would take too much of the time.
@@ -158,23 +163,6 @@ fn cast(solution: &Solution, camera: &Camera, options: &RenderOptions, monitor: 
         }
     }
     ViewRays::new(tracer, camera, width, height)
-}
-
-/// One of all that is seen of a triangle's side in each square of so many pixels, and for each that is seen which of them stands for
-/// it.
-fn squares(view: &ViewRays, side: u32) -> (Vec<usize>, Vec<usize>) {
-    let (mut own, mut of) = (Vec::new(), Vec::with_capacity(view.seen.len()));
-    let mut known: HashMap<(u32, u32, Side, bool), usize> = HashMap::new();
-    for (i, seen) in view.seen.iter().enumerate() {
-        let (row, column) = (seen.pixel / view.width / side, seen.pixel % view.width / side);
-        let square = row * view.width + column;
-        let stands = *known.entry((square, seen.place.triangle, seen.side, seen.behind)).or_insert(own.len());
-        if stands == own.len() {
-            own.push(i);
-        }
-        of.push(stands);
-    }
-    (own, of)
 }
 
 /// What direct light of all pixels takes by its shadow rays.

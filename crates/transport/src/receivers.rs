@@ -190,6 +190,8 @@ pub struct ShadedReceivers<'a> {
     pub all: &'a ElementReceivers<'a>,
     /// Those that receive, and the unit normals at their corners.
     pub shaded: &'a [(u32, [DVec3; 3])],
+    /// Another number makes other random choices.
+    pub salt: u32,
 }
 
 impl Receivers for ShadedReceivers<'_> {
@@ -215,7 +217,7 @@ impl Receivers for ShadedReceivers<'_> {
     }
 
     fn seed(&self, i: usize) -> u32 {
-        self.shaded[i].0
+        self.shaded[i].0 ^ radiosity_trace::sampling::hash(self.salt)
     }
 }
 
