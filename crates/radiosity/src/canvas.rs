@@ -2,7 +2,7 @@
 //! it keeps what it knows: only where the map before was rough are texels lit anew.
 
 use crate::answer::Station;
-use crate::faces::{Face, faces, is_hidden};
+use crate::faces::{Face, faces, is_hidden, is_shown_in_part};
 use crate::judge::{Judge, WrittenRound};
 use crate::texels::{self, Sheet};
 use crate::{Error, Monitor, Solution, stations};
@@ -42,10 +42,12 @@ pub(crate) struct Canvas<'b, 'a> {
     index: HashMap<(usize, Side), usize>,
 }
 
-/// Light of texels, not a number inside solids, and what was gathered of it where that is smooth; lx per band.
+/// Light of texels, not a number inside solids, and what was gathered of it where that is smooth; lx per band. And whether something of what a
+/// texel stands for may be seen though its middle is not.
 struct Lit {
     light: Vec<Bands>,
     smooth: Vec<Option<Bands>>,
+    doubtful: Vec<bool>,
 }
 
 /// A canvas with its light.
@@ -114,12 +116,14 @@ impl<'b, 'a> Canvas<'b, 'a> {
             let fresh: Vec<Texel> = texels.iter().zip(&known).filter(|(_, e)| e.is_none()).map(|(t, _)| *t).collect();
             lit += fresh.len();
             let at = |t: &Texel| usize::from(t.y) * size[0] as usize + usize::from(t.x);
-            let Lit { light, smooth } = self.light(&atlas, page, &fresh, judge, monitor)?;
+            let Lit { light, smooth, doubtful } = self.light(&atlas, page, &fresh, judge, monitor)?;
             let smooth: HashMap<usize, Bands> =
                 fresh.iter().zip(smooth).filter_map(|(texel, light)| Some((at(texel), light?))).collect();
             let mut fresh = light.into_iter();
             let mut values: Vec<Bands> = known.iter().filter_map(|e| e.or_else(|| fresh.next())).collect();
             let mut points = texels.clone();
+            let mut of_fresh = doubtful.into_iter();
+            let mut doubtful: Vec<bool> = known.iter().map(|e| e.is_none() && of_fresh.next() == Some(true)).collect();
             // What is known gets no more points: it counts twice.
             for (texel, value) in texels.iter().zip(&known) {
                 if let Some(value) = value {
@@ -128,7 +132,8 @@ impl<'b, 'a> Canvas<'b, 'a> {
                 }
             }
             for _ in 0..EDGE_ROUNDS {
-                let more = atlas.finer(page, &points, &values, EDGE_CONTRAST, EDGE_POINTS);
+                doubtful.resize(points.len(), false);
+                let more = atlas.finer(page, (&points, &values, &doubtful), EDGE_CONTRAST, EDGE_POINTS);
                 if more.is_empty() || !judge.has_time_for_edges(more.len(), EDGE_POINTS, later(page), monitor) {
                     break;
                 }
@@ -182,10 +187,10 @@ impl<'b, 'a> Canvas<'b, 'a> {
         judge: &Judge,
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error> {
-        let at = self.stations(texels);
+        let all = self.stations(texels);
         let shown: Vec<usize> =
-            (0..texels.len()).into_par_iter().filter(|&i| !is_hidden(self.solution, &at[i])).collect();
-        let (own, at): (Vec<Texel>, Vec<Station>) = shown.iter().map(|&i| (texels[i], at[i])).unzip();
+            (0..texels.len()).into_par_iter().filter(|&i| !is_hidden(self.solution, &all[i])).collect();
+        let (own, at): (Vec<Texel>, Vec<Station>) = shown.iter().map(|&i| (texels[i], all[i])).unzip();
         let sheet = Sheet { atlas, page, texels: &own };
         let found = texels::light(judge.baked(), sheet, &at, (judge.gathers(), judge.thinned()), monitor)?;
         let (mut light, mut smooth) = (vec![[f32::NAN; 3]; texels.len()], vec![None; texels.len()]);
@@ -193,7 +198,12 @@ impl<'b, 'a> Canvas<'b, 'a> {
             light[i] = std::array::from_fn(|k| d[k] + p.light[k]);
             smooth[i] = (p.own < SMOOTH).then_some(p.light);
         }
-        Ok(Lit { light, smooth })
+        let mut doubtful = vec![true; texels.len()];
+        shown.iter().for_each(|&i| doubtful[i] = false);
+        for (is_doubtful, station) in doubtful.iter_mut().zip(&all).filter(|(is_doubtful, _)| **is_doubtful) {
+            *is_doubtful = is_shown_in_part(self.solution, station);
+        }
+        Ok(Lit { light, smooth, doubtful })
     }
 
     /// Further points of texels, whose indirect light may be known.

@@ -72,6 +72,13 @@ pub(crate) fn lit_vertex(tracer: &Tracer, triangle: usize, uv: DVec2) -> LitVert
     }
 }
 
+/// Whether a part of the element that a station lies on is known to be seen, and another to lie inside a solid.
+pub(crate) fn is_shown_in_part(solution: &Solution, station: &Station) -> bool {
+    let (u, v) = (station.uv.x as f32, station.uv.y as f32);
+    let share = |element| solution.exposure.share(element);
+    solution.elements.at(station.place.triangle, u, v, station.side).map(share).is_some_and(|s| s > 0.0 && s < 1.0)
+}
+
 /// Whether a station lies inside a solid, so that nobody ever sees its light.
 pub(crate) fn is_hidden(solution: &Solution, station: &Station) -> bool {
     let (u, v) = (station.uv.x as f32, station.uv.y as f32);

@@ -1,7 +1,7 @@
 //! A solution as a lightmap: every texel is lit like a point of the surface.
 
 use crate::bake::Baked;
-use crate::canvas::Canvas;
+use crate::canvas::{Canvas, Drawn};
 use crate::faces::lit_vertex;
 use crate::judge::{Judge, STEP, Written, WrittenRound, is_stalled, root_mean_square};
 use crate::monitor::is_over;
@@ -103,6 +103,14 @@ pub fn points_about(mesh: &Mesh) -> usize {
 /// A vertex of a primitive: its slot, source corners, weights and texture coordinates, the floats by their bits.
 type VertexKey = (usize, [u32; 3], [u32; 3], [u32; 2]);
 
+/// A map and what the referee says of it.
+struct Attempt {
+    drawn: Drawn,
+    audit: Audit,
+    /// Texels per metre at most.
+    finest: f64,
+}
+
 /// Bakes a solution into a lightmap. Where no density is given, texels are made finer where the light is rough until the
 /// map as it is read back meets the error that the solution was asked for.
 ///
@@ -135,6 +143,10 @@ pub fn lightmap(
     let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
     let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
     let mut rounds = vec![drawn.round(&audit)];
+    let finest_of = |finer: &[f64]| params.texels_per_metre * finer.iter().fold(1.0, |most: f64, f| f.max(most));
+    let mut finest = finest_of(&canvas.charts.finer);
+    // Finer texels may be read back worse where little light is seen of what lies between things.
+    let mut best: Option<Attempt> = None;
 
     // Finer texels while the map misses what the solution has and the texels that are needed can be had.
     let tolerance = baked.error * root_mean_square(&baked.solution);
@@ -162,16 +174,28 @@ pub fn lightmap(
         let Some(step) = steps.filter_map(allot).find(is_near) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
-        drawn = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;
-        audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
-        rounds.push(drawn.round(&audit));
+        let next = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;
+        let judged = judge.audit(monitor, |station| canvas.read(&next, station))?;
+        rounds.push(next.round(&judged));
+        let before = Attempt {
+            drawn: std::mem::replace(&mut drawn, next),
+            audit: std::mem::replace(&mut audit, judged),
+            finest: std::mem::replace(&mut finest, finest_of(&canvas.charts.finer)),
+        };
+        let upper = best.as_ref().map_or(audit.upper, |best| best.audit.upper.min(audit.upper));
+        if before.audit.upper < upper {
+            best = Some(before);
+        }
+    }
+    if let Some(best) = best.filter(|best| best.audit.upper < audit.upper) {
+        Attempt { drawn, audit, finest } = best;
     }
 
     Ok(Lightmap {
         primitives: primitives(&canvas, &drawn.atlas),
         density: params.texels_per_metre,
         reduced: drawn.atlas.reduced,
-        finest: params.texels_per_metre * canvas.charts.finer.iter().fold(1.0, |most, f| f.max(most)),
+        finest,
         texels: drawn.texels(),
         needed: needed.filter(|_| audit.upper > baked.error),
         audit,

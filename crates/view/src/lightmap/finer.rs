@@ -18,6 +18,7 @@ struct Light {
     sum: f64,
     finite: u32,
     points: u32,
+    is_doubtful: bool,
 }
 
 impl Light {
@@ -38,19 +39,26 @@ impl Light {
 impl Atlas {
     /// Points to evaluate besides `texels`, up to `points` (at most 64) in the square around the centre of each texel
     /// whose luminance differs from that of one of its eight neighbours on the chart by more than the share
-    /// `contrast` of the brighter one. `values[i]` belongs to `texels[i]`; a buried place, whose value is not finite,
-    /// differs from every other. [`super::fill`] takes the mean of all points of a texel.
+    /// `contrast` of the brighter one, or is `doubtful`. `values[i]` and `doubtful[i]` belong to `texels[i]`; a buried place, whose
+    /// value is not finite, differs from every other. [`super::fill`] takes the mean of all points of a texel.
     ///
     /// To be called again with all points so far, until nothing comes back: a thin shadow that one centre met is
     /// followed from texel to texel, where it ran between the centres. No texel gets points twice.
-    pub fn finer(&self, page: usize, texels: &[Texel], values: &[Bands], contrast: f64, points: u32) -> Vec<Texel> {
+    pub fn finer(
+        &self,
+        page: usize,
+        (texels, values, doubtful): (&[Texel], &[Bands], &[bool]),
+        contrast: f64,
+        points: u32,
+    ) -> Vec<Texel> {
         let Some(&[width, height]) = self.pages.get(page) else { return Vec::new() };
         let (width, height) = (width as usize, height as usize);
         let mut light = vec![Light::default(); width * height];
-        for (texel, value) in texels.iter().zip(values) {
+        for ((texel, value), is_doubtful) in texels.iter().zip(values).zip(doubtful) {
             let (x, y) = (usize::from(texel.x), usize::from(texel.y));
             if x < width && y < height {
                 light[y * width + x].add(f64::from(luminance(*value)));
+                light[y * width + x].is_doubtful |= is_doubtful;
             }
         }
         let (sum, count) =
@@ -78,7 +86,7 @@ impl Atlas {
                     let around = (y.saturating_sub(1)..=(y + 1).min(rows - 1))
                         .flat_map(|y| (x.saturating_sub(1)..=(x + 1).min(columns - 1)).map(move |x| (x, y)));
                     let mut others = around.map(|(x, y)| at(x, y)).filter(|other| other.points > 0);
-                    others.any(|other| differ(own.mean(), other.mean()))
+                    own.is_doubtful || others.any(|other| differ(own.mean(), other.mean()))
                 })
                 .collect();
             if mixed.contains(&true) {

@@ -431,7 +431,7 @@ fn thin_shadows_do_not_fall_into_dashes() {
     let mut texels = atlas.texels(0);
     let mut values = light(&texels);
     let even = vec![[1.0; 3]; texels.len()];
-    assert!(atlas.finer(0, &texels, &even, 0.1, 16).is_empty());
+    assert!(atlas.finer(0, (&texels, &even, &vec![false; texels.len()]), 0.1, 16).is_empty());
     // Darkness in every row of texels; the bar is 4/12 of a texel wide.
     let missing = |picture: &[[f32; 3]]| -> Vec<f64> {
         let [width, height] = atlas.pages[0].map(|side| side as usize);
@@ -442,7 +442,7 @@ fn thin_shadows_do_not_fall_into_dashes() {
     let before = missing(&fill(atlas.pages[0], &texels, &values));
     let first = texels.len();
     for round in 0.. {
-        let more = atlas.finer(0, &texels, &values, 0.1, 16);
+        let more = atlas.finer(0, (&texels, &values, &vec![false; texels.len()]), 0.1, 16);
         assert!(round < 5, "the bar runs through five texels of a row at most");
         if more.is_empty() {
             break;

@@ -234,3 +234,57 @@ fn no_light_leaks_below_walls_on_and_through_one_floor() {
         assert_no_light_leaks(scene, 1.537..1.537 + thickness, &format!("{thickness} thick, {sunk} sunk"));
     }
 }
+
+/// The outside of a box.
+fn add_box(scene: &mut Scene, name: &str, [low, high]: [DVec3; 2]) {
+    let corner = |i: usize| DVec3::from_array([0, 1, 2].map(|k| if i >> k & 1 == 0 { low[k] } else { high[k] }));
+    for side in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+        scene.add_quad(name, 0, side.map(corner));
+    }
+}
+
+/// A post in two sleeves that leave three centimetres of it open, where no texel has its middle: those there had light of whatever lay
+/// beside them in the map.
+#[test]
+fn what_is_seen_between_the_middles_of_texels_is_lit() {
+    let mut scene = Scene { sky: Sky::Uniform([1000.0; 3]), up: Up::Z, ..Scene::default() };
+    scene.materials.push(matte("black", [0.0; 3], [0.0; 3]));
+    let (post, sleeve, open) = (0.01, 0.05, 0.57..0.60);
+    let around = |half: f64, z: [f64; 2]| [DVec3::new(-half, -half, z[0]), DVec3::new(half, half, z[1])];
+    add_box(&mut scene, "post", around(post, [0.0, 1.04]));
+    add_box(&mut scene, "sleeve", around(sleeve, [-0.1, open.start]));
+    add_box(&mut scene, "sleeve", around(sleeve, [open.end, 1.2]));
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let solve = SolveOptions { element_size: Some(0.05), ..SolveOptions::default() };
+    let baked = bake(&tracer, &BakeOptions { error: 0.05, solve, ..BakeOptions::default() }, &()).unwrap();
+    let map = lightmap(&baked, Some(8.0), 4096, &()).unwrap();
+    let middle = (DVec3::new(post, 0.0, 0.585), DVec3::X);
+    let options = MeasureOptions { error: 0.02, ..MeasureOptions::default() };
+    let truth = measure(&tracer, &[middle], &options, &()).unwrap().irradiance[0][1];
+    assert!((600.0..1400.0).contains(&truth), "{truth}");
+    let mut count = 0;
+    for primitive in map.primitives.iter().filter(|p| scene.objects[p.object].name == "post") {
+        let Light::Lightmap { page, uv } = &primitive.light else { panic!("no lightmap") };
+        let object = &scene.objects[primitive.object];
+        for corners in &primitive.triangles {
+            let place = |v: u32| {
+                let vertex = &primitive.vertices[v as usize];
+                let at = vertex.corners.map(|c| scene.positions[object.vertices.start + c as usize]);
+                (0..3).map(|k| f64::from(vertex.weights[k]) * at[k]).sum::<DVec3>()
+            };
+            let ([a, b, c], [p, q, r]) = (corners.map(place), corners.map(|v| Vec2::from(uv[v as usize])));
+            for k in 0..400u16 {
+                let (u, v) = (f32::from(k % 20) / 19.0, f32::from(k / 20) / 19.0);
+                let (u, v) = (u * (1.0 - v), v);
+                let z = (a + f64::from(u) * (b - a) + f64::from(v) * (c - a)).z;
+                if (0.575..0.595).contains(&z) {
+                    let read = look_up(map.pages[*page], &map.irradiance[*page], p + u * (q - p) + v * (r - p))[1];
+                    assert!((0.6 * truth..1.4 * truth).contains(&read), "{read} of {truth} at {z}");
+                    count += 1;
+                }
+            }
+        }
+    }
+    assert!(count > 10, "{count}");
+}
