@@ -79,6 +79,9 @@ const LEAST_TEXELS: f64 = 0.25;
 /// more.
 const MOST_GROWTH: f64 = 20.0;
 
+/// The same where the error is not reached with so many: who asks for little error wants no less than who asks for more.
+const MOST_IN_VAIN: f64 = 4.0;
+
 /// How many times as many texels as at first are lit in a round at most: it takes as many times as long then.
 const MOST_LIT: f64 = 3.0;
 
@@ -162,15 +165,16 @@ pub fn lightmap(
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
         let whole = allot(goal.left);
         needed = whole.as_ref().map(|whole| whole.texels);
-        // A map that cannot reach it is not begun.
-        if whole.is_none_or(|whole| whole.texels > most.min(MOST_GROWTH * budget)) {
-            break;
-        }
+        // Where no map reaches it, one goes as far as the next may.
+        let is_reached = whole.is_some_and(|whole| whole.texels <= most.min(MOST_GROWTH * budget));
         let lit = |step: &Allotment| if goal.relight { step.texels } else { step.rough };
         // As far as a round may go; if not all the way, it is not the last.
         let steps = std::iter::successors(Some(goal.left.max(STEP)), |left| Some(STEP_BACK * left))
             .take_while(|left| *left < 1.0);
-        let is_near = |step: &Allotment| lit(step) <= MOST_LIT * budget && judge.has_time(lit(step), EDGES, monitor);
+        let is_near = |step: &Allotment| {
+            let is_affordable = is_reached || step.texels <= most.min(MOST_IN_VAIN * budget);
+            is_affordable && lit(step) <= MOST_LIT * budget && judge.has_time(lit(step), EDGES, monitor)
+        };
         let Some(step) = steps.filter_map(allot).find(is_near) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
