@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.stage(&arguments.output, &views::encode(&arguments.output, &picture, exposure)?)?;
     outputs.commit()?;
 
-    let is_over = baked.out_of_time || view.shadow_rays < render.shadowing.rays || progress.is_over();
+    let is_over = baked.out_of_time || view.is_hurried || progress.is_over();
     let mut error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
     if error.is_lost_in_writing() && error.upper_95_one_sided.is_finite() {
         let closer = error.asked * error.asked / error.upper_95_one_sided;

@@ -33,7 +33,7 @@ pub fn for_page(view: &View) -> View {
         small.surfaces.push(block.clone().any(|i| picture.surfaces[i]));
         illuminance.extend(block.clone().map(|i| view.illuminance[i]).nth((n * n / 2) as usize));
     }
-    View { picture: small, illuminance, watched: Vec::new(), shadow_rays: view.shadow_rays }
+    View { picture: small, illuminance, watched: Vec::new(), is_hurried: view.is_hurried }
 }
 
 /// Illuminance in the colours of its classes, PNG.

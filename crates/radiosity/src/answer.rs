@@ -46,7 +46,7 @@ pub struct Answer {
 }
 
 /// Irradiance at stations whose direct light is known, by the field of indirect light.
-pub(crate) fn read(stations: &[Station], direct: Vec<Bands>, field: &Field) -> Answer {
+fn read(stations: &[Station], direct: Vec<Bands>, field: &Field) -> Answer {
     let irradiance = stations
         .par_iter()
         .zip(&direct)

@@ -71,6 +71,11 @@ impl Drawn {
         self.texels.iter().map(Vec::len).sum()
     }
 
+    /// Without what another map would be drawn by.
+    pub fn handed_out(self) -> Drawn {
+        Drawn { values: Vec::new(), plain: Vec::new(), ..self }
+    }
+
     /// What came of it.
     pub fn round(&self, audit: &Audit) -> WrittenRound {
         WrittenRound { points: self.texels(), lit: self.lit, error: audit.error, upper: audit.upper }

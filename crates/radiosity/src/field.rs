@@ -2,7 +2,7 @@
 //! noise where it is looked at.
 
 use crate::measure::brought_nothing;
-use crate::monitor::{Monitor, Watch};
+use crate::monitor::{Monitor, Watch, is_over};
 use crate::pace;
 use crate::{Error, Solution};
 use glam::DVec3;
@@ -20,7 +20,7 @@ const FLAT: f64 = 0.99996;
 /// Fewest rays that gather for an element of a divided cell: what is left of 128 for the smallest of 16.
 const FEWEST_RAYS: usize = 8;
 
-/// Rays that gather for a cell that is looked at at most: half a minute for 15,000 cells.
+/// Rays from which on a cell that is looked at gathers no more.
 const MOST_RAYS: usize = 4096;
 
 /// Rays that each cell that is looked at gathers with, however little time there is: elements that are looked up alone may have sixteen
@@ -30,17 +30,18 @@ const LEAST_SEEN: usize = 64;
 /// Noise that is seen on a smooth wall, relative to its light: pictures have no more, whatever error is asked for.
 const VISIBLE: f64 = 0.01;
 
-/// Rays by which a pass has more of them: between a quarter of those so far, as it is judged anew, and as many, as its noise is told roughly.
-const MORE: [usize; 2] = [4, 1];
+/// Rays that a pass adds, over those so far: fewer would not be worth judging it anew, and more not be planned by noise that is told
+/// roughly.
+const LEAST_MORE: f64 = 0.25;
+const MOST_MORE: f64 = 1.0;
 
 /// An element, and the unit normals at its corners that it receives with.
 type Shaded = (u32, [DVec3; 3]);
 
 /// Rays that bring the noise of those that cells had, so many times as much as is wanted, down to that: it falls with their root at least.
 fn further(had: usize, over: f64) -> usize {
-    let [least, most] = MORE.map(|part| had / part);
-    let wanted = had as f64 * (over * over - 1.0);
-    (wanted.min(most as f64) as usize).max(least).next_multiple_of(FEWEST_RAYS)
+    let more = (over * over - 1.0).clamp(LEAST_MORE, MOST_MORE);
+    ((more * had as f64) as usize).max(1).next_multiple_of(FEWEST_RAYS)
 }
 
 impl Solution<'_> {
@@ -71,7 +72,7 @@ impl Solution<'_> {
         {
             let each = self.seconds_to_gather(&curved, LEAST_SEEN, &light, monitor)?;
             // Half of the time at most: an audit follows.
-            rays = pace::leap(LEAST_SEEN, rays as f64, 0.5 * left, each).unwrap_or(LEAST_SEEN).min(rays);
+            rays = pace::affordable(0.5 * left, each).clamp(LEAST_SEEN, rays);
         }
         self.gather_on(&curved, (rays, 0), &mut light, monitor)?;
         Ok(light)
@@ -79,7 +80,7 @@ impl Solution<'_> {
 
     /// The field of `light` by element, in halves, where cells are looked at, each as often as `looks` says. Where its noise
     /// there is more than `error`, or than is visible, these and what is around them gather anew, with more rays until
-    /// it is not, or that brings nothing, or there are 4,096 for each cell.
+    /// it is not, or that brings nothing, or there are 4,096 or more for each cell.
     ///
     /// # Errors
     /// [`Error::Stopped`].
@@ -97,22 +98,26 @@ impl Solution<'_> {
         let elements = (0..around.len()).filter(|cell| around[*cell]).flat_map(|cell| self.elements.of_cell(cell));
         let seen: Vec<Shaded> = elements.map(|element| (element, self.shading_normals(element))).collect();
         let noise = |light: &[[Bands; 2]]| self.noise(light, |cell, _| f64::from(looks[cell]));
-        let (wanted, first) = (error.min(VISIBLE), 2 * self.rays());
+        let (wanted, first) = (error.min(VISIBLE), (2 * self.rays()).max(FEWEST_RAYS));
         // Within a time limit, seconds for each ray.
-        let each = match pace::left(monitor) {
+        let mut each = match pace::left(monitor) {
             Some(_) => Some(self.seconds_to_gather(&seen, first.min(LEAST_SEEN), &light, monitor)?),
             None => None,
         };
-        let mut noises = vec![noise(&light)];
         // Rays of each cell so far; those that the light came with are left out.
         let mut had = 0;
+        if each.is_some() && is_over(monitor) && first <= LEAST_SEEN {
+            self.gather_on(&seen, (LEAST_SEEN, 0), &mut light, monitor)?;
+            had = LEAST_SEEN;
+        }
+        let mut noises = vec![noise(&light)];
         while let Some(&last) = noises.last().filter(|last| **last > wanted)
-            && had < MOST_RAYS
+            && had.max(first) <= MOST_RAYS
             && !brought_nothing(&noises)
         {
             let [least, mut rays] = match had {
                 0 => [first, first],
-                _ => [had / MORE[0], further(had, last / wanted)].map(|rays| rays.min(MOST_RAYS - had)),
+                _ => [(LEAST_MORE * had as f64) as usize, further(had, last / wanted)],
             };
             if let (Some(each), Some(left)) = (each, pace::left(monitor)) {
                 let affordable = pace::affordable(left, each);
@@ -124,11 +129,14 @@ impl Solution<'_> {
                 };
             }
             let mut more = light.clone();
-            self.gather_on(&seen, (rays, noises.len() as u32 - 1), &mut more, monitor)?;
+            let gather = || self.gather_on(&seen, (rays, noises.len() as u32), &mut more, monitor);
+            let (took, gathered) = pace::timed(gather);
+            gathered?;
+            each = each.map(|_| took / rays as f64);
             let share = rays as f32 / (had + rays) as f32;
             for element in seen.iter().map(|(element, _)| *element as usize) {
                 for (all, more) in light[element].iter_mut().flatten().zip(more[element].iter().flatten()) {
-                    *all += share * (more - *all);
+                    *all = (1.0 - share) * *all + share * more;
                 }
             }
             had += rays;

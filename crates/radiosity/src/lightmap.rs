@@ -34,7 +34,7 @@ pub struct Lightmap {
     pub texels: usize,
     /// What the referee says of the texels as a viewer reads them, before they are stored in 8 bits.
     pub audit: Audit,
-    /// The attempts, each with more texels than the one before.
+    /// The attempts, each with more texels than the one before. That which is read back best is the map.
     pub rounds: Vec<WrittenRound>,
     /// About how many texels the error asked would take, if it was missed and this is known.
     pub needed: Option<f64>,
@@ -79,7 +79,8 @@ const LEAST_TEXELS: f64 = 0.25;
 /// more.
 const MOST_GROWTH: f64 = 20.0;
 
-/// The same where the error is not reached with so many: who asks for little error wants no less than who asks for more.
+/// The same where even so many would not reach the error: a map that stayed as it was at first would be worse than that of who asks for more
+/// error. A furnished office at 2 % comes from 7.3 to 3.8 % so, in twice the time.
 const MOST_IN_VAIN: f64 = 4.0;
 
 /// How many times as many texels as at first are lit in a round at most: it takes as many times as long then.
@@ -148,7 +149,7 @@ pub fn lightmap(
     let mut rounds = vec![drawn.round(&audit)];
     let finest_of = |finer: &[f64]| params.texels_per_metre * finer.iter().fold(1.0, |most: f64, f| f.max(most));
     let mut finest = finest_of(&canvas.charts.finer);
-    // Finer texels may be read back worse where little light is seen of what lies between things.
+    // Finer texels may be read back worse: where those lie that stand for small things is chance.
     let mut best: Option<Attempt> = None;
 
     // Finer texels while the map misses what the solution has and the texels that are needed can be had.
@@ -165,7 +166,6 @@ pub fn lightmap(
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
         let whole = allot(goal.left);
         needed = whole.as_ref().map(|whole| whole.texels);
-        // Where no map reaches it, one goes as far as the next may.
         let is_reached = whole.is_some_and(|whole| whole.texels <= most.min(MOST_GROWTH * budget));
         let lit = |step: &Allotment| if goal.relight { step.texels } else { step.rough };
         // As far as a round may go; if not all the way, it is not the last.
@@ -188,11 +188,15 @@ pub fn lightmap(
         };
         let upper = best.as_ref().map_or(audit.upper, |best| best.audit.upper.min(audit.upper));
         if before.audit.upper < upper {
-            best = Some(before);
+            best = Some(Attempt { drawn: before.drawn.handed_out(), ..before });
         }
     }
-    if let Some(best) = best.filter(|best| best.audit.upper < audit.upper) {
-        Attempt { drawn, audit, finest } = best;
+    if let Some(mut best) = best {
+        // By all that the referee knows now.
+        best.audit = judge.audit(monitor, |station| canvas.read(&best.drawn, station))?;
+        if best.audit.upper < audit.upper {
+            Attempt { drawn, audit, finest } = best;
+        }
     }
 
     Ok(Lightmap {

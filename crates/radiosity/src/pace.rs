@@ -49,9 +49,7 @@ impl Cost {
         // In this order, as there may be nothing left to choose.
         affordable.min(most).max(least)
     }
-}
 
-impl Cost {
     /// What a part of the work takes.
     pub fn of(&self, part: f64) -> Cost {
         Cost { fixed: part * self.fixed, each: part * self.each }
@@ -71,14 +69,6 @@ pub(crate) fn suffices(seconds: f64, needed: f64) -> bool {
 /// Rays that seconds suffice for with `each` for a ray, with some left over.
 pub(crate) fn affordable(seconds: f64, each: f64) -> usize {
     (SURE * seconds / each.max(f64::MIN_POSITIVE)) as usize
-}
-
-/// Rays of the next of passes that begin anew, each with twice the rays of the one before as long as there is no hurry: of these
-/// the most that are no more than are `wanted`, rounded up, and than seconds allow with `each` for a ray; nothing where the first,
-/// `next`, takes too long.
-pub(crate) fn leap(next: usize, wanted: f64, seconds: f64, each: f64) -> Option<usize> {
-    let passes = std::iter::successors(Some(next), |rays| ((*rays as f64) < wanted).then_some(2 * rays));
-    passes.take_while(|rays| suffices(seconds, each * *rays as f64)).last()
 }
 
 /// Seconds of a `total` that are kept for what is to come, which takes as many as `full` if nothing is spared.
@@ -125,7 +115,7 @@ pub(crate) struct Reading {
     pub audit: f64,
 }
 
-/// Shadow rays of a pixel in the mean, as light is found at half of them at most, and what cells that are seen gather beside them
+/// Shadow rays of a pixel in the mean, as light is found at about half of them, and what cells that are seen gather beside them
 /// takes, relative to them, about.
 const PIXEL: (f64, f64) = (128.0, 2.0);
 
@@ -225,21 +215,6 @@ mod tests {
         let cost = Cost::new([(16.0, 0.03), (64.0, 0.02)], 100.0);
         assert!(cost.rays(10.0, [16.0, 1e6]) < 1000.0, "{cost:?}");
         assert!((cost.seconds(64.0) - 2.0).abs() < 1e-9, "{cost:?}");
-    }
-
-    /// Passes leap to the rays that are wanted, no further than there is time, and never beyond the deadline by their own estimate.
-    #[test]
-    fn passes_leap_as_far_as_there_is_time() {
-        assert_eq!(leap(64, 1024.0, 1e9, 1e-3), Some(1024));
-        assert_eq!(leap(64, 1000.0, 1e9, 1e-3), Some(1024));
-        assert_eq!(leap(64, 1.0, 1e9, 1e-3), Some(64));
-        assert_eq!(leap(64, 1024.0, 0.05, 1e-3), None);
-        for k in 0..16 {
-            let seconds = 0.1 * 1.5f64.powi(k);
-            if let Some(rays) = leap(64, 1024.0, seconds, 1e-3) {
-                assert!(1e-3 * rays as f64 <= seconds && (rays == 1024 || 2.4e-3 * rays as f64 > seconds), "{seconds}");
-            }
-        }
     }
 
     /// Refinement leaves time for what follows, as much as it takes or more than half; without a deadline there is none to leave.

@@ -5,6 +5,8 @@
 //! (`transport::eclipse`), so that a few places tell whether it is smooth between them. Where it is not, a square of the picture is
 //! quartered (as Whitted 1980, "An improved illumination model for shaded display", quarters pixels by the colours of their corners),
 //! and what is around it is looked at more closely, as edges of shadows go on.
+//!
+//! Shadows that are narrower than the four pixels between places, and pass between all of those that are looked at, are lost.
 
 use crate::Error;
 use crate::allocation::Lit;
@@ -29,9 +31,11 @@ const ENOUGH: usize = 5;
 
 /// By how much light may be off the plane, relative to all the light there: half a step of what a display of 8 bits shows; and three times the
 /// noise of 256 shadow rays about where rays leave some, and with others over their root as much. Light below a part of the mean counts
-/// as if it was as much.
+/// as if it was as much: in the dark little is seen. With twice as much walls show the squares.
 const SMOOTH: f32 = 0.004;
 const NOISE_OF_A_RAY: f32 = 0.012 * 16.0;
+/// With more noise than so much, planes that fit would be seen as squares.
+const NOISIEST: f32 = 0.024;
 const DARK: f64 = 0.1;
 
 /// Places lie on one surface if their normals differ by less than this cosine, that of two degrees and a half, and so does the way from
@@ -39,7 +43,7 @@ const DARK: f64 = 0.1;
 const FLAT: f64 = 0.999;
 const ALONG: f64 = 0.045;
 
-/// Places at which light is found, over those at which it is first looked for, about: 1.7 in a furnished office.
+/// Places at which light is found, over those at which it is first looked for, about, with some left over: 1.7 in a furnished office.
 const FOLLOWING: f64 = 2.0;
 
 /// What a square of the picture shows of a surface; places by number.
@@ -48,7 +52,7 @@ struct Tile {
     /// Pixels from the top left over its side.
     square: [u32; 2],
     level: usize,
-    /// The largest one that it is of.
+    /// Number of the largest square's one that it was cut from.
     whole: usize,
     places: Vec<u32>,
     /// Those of that surface that the next squares begin with.
@@ -59,12 +63,12 @@ struct Tile {
 struct Light<'a> {
     view: &'a ViewRays,
     indirect: &'a [Bands],
-    /// No place counts as if it had less.
+    /// No place counts as if it had less: a part of the mean over those that were found first.
     dark: f32,
     /// Where light was found, and by what part of all it may be off a plane.
     found: Vec<Option<(Bands, f32)>>,
-    /// Light elsewhere.
-    told: Vec<Bands>,
+    /// What planes tell.
+    told: Vec<Option<Bands>>,
 }
 
 /// A plane of light over a surface.
@@ -118,14 +122,12 @@ impl<'a> Tiles<'a> {
         let mut tiles = wholes.clone();
         while !tiles.is_empty() {
             let asked: Vec<u32> = asked(view, &tiles).into_iter().filter(|place| !light.is_found(*place)).collect();
-            match light_of(&asked)? {
-                Some((lit, rays)) => light.add(&asked, lit, rays),
-                None => {
-                    let mut left: Vec<usize> = tiles.iter().map(|tile| tile.whole).collect();
-                    left.dedup();
-                    left.into_iter().for_each(|whole| light.spread(&wholes[whole]));
+            if !asked.is_empty() {
+                let Some((lit, rays)) = light_of(&asked)? else {
+                    tiles.iter().for_each(|tile| light.spread(tile, &wholes[tile.whole]));
                     break;
-                }
+                };
+                light.add(&asked, lit, rays);
             }
             let mut quartered = light.tell(&tiles);
             quartered.iter().for_each(|tile| is_quartered[tile.whole] = true);
@@ -142,8 +144,7 @@ impl<'a> Tiles<'a> {
             }
             tiles = quartered.into_par_iter().flat_map_iter(|tile| tile.quarters(view)).collect();
         }
-        let Light { found, told, .. } = light;
-        Ok(found.into_iter().zip(told).map(|(found, told)| found.map_or(told, |(light, _)| light)).collect())
+        Ok(light.all())
     }
 }
 
@@ -253,8 +254,7 @@ impl Tile {
 impl<'a> Light<'a> {
     fn new(view: &'a ViewRays, indirect: &'a [Bands]) -> Light<'a> {
         let n = view.seen.len();
-        let mean = indirect.iter().map(|e| f64::from(luminance(*e))).sum::<f64>() / n.max(1) as f64;
-        Light { view, indirect, dark: (DARK * mean) as f32, found: vec![None; n], told: vec![[0.0; 3]; n] }
+        Light { view, indirect, dark: 0.0, found: vec![None; n], told: vec![None; n] }
     }
 
     fn is_found(&self, place: u32) -> bool {
@@ -262,18 +262,26 @@ impl<'a> Light<'a> {
     }
 
     fn add(&mut self, places: &[u32], Lit { light, is_exact }: Lit, rays: u32) {
-        let noise = (NOISE_OF_A_RAY / (rays.max(1) as f32).sqrt()).max(SMOOTH);
+        let noise = (NOISE_OF_A_RAY / (rays.max(1) as f32).sqrt()).clamp(SMOOTH, NOISIEST);
         for ((place, light), is_exact) in places.iter().zip(light).zip(is_exact) {
             self.found[*place as usize] = Some((light, if is_exact { SMOOTH } else { noise }));
+        }
+        if self.dark == 0.0 {
+            let all = |&place: &u32| {
+                let direct = self.found[place as usize].map_or(0.0, |(light, _)| luminance(light));
+                f64::from(direct + luminance(self.indirect[place as usize]))
+            };
+            self.dark = (DARK * places.iter().map(all).sum::<f64>() / places.len().max(1) as f64) as f32;
         }
     }
 
     /// What was found in a tile and beside it.
-    fn found_in(&self, tile: &Tile) -> SmallVec<[(&Seen, Bands, f32); 16]> {
+    fn found_in(&self, tile: &Tile) -> SmallVec<[(&Seen, Bands, Bands); 16]> {
         let of = |&place: &u32| {
             let (light, part) = self.found[place as usize]?;
-            let all = luminance(light) + luminance(self.indirect[place as usize]);
-            Some((seen(self.view, place), light, part * all.max(self.dark)))
+            let all: Bands = std::array::from_fn(|band| light[band] + self.indirect[place as usize][band]);
+            let off = all.map(|e| part * e.max(luminance(all)).max(self.dark));
+            Some((seen(self.view, place), light, off))
         };
         tile.places.iter().chain(&tile.beside).filter_map(of).collect()
     }
@@ -286,13 +294,15 @@ impl<'a> Light<'a> {
             match plane {
                 Some(plane) => {
                     for &place in &tile.places {
-                        self.told[place as usize] = plane.at(seen(self.view, place)).map(|e| e.max(0.0));
+                        self.told[place as usize] = Some(plane.at(seen(self.view, place)).map(|e| e.max(0.0)));
                     }
+                    continue;
                 }
                 // Few places say nothing, and light is found at all of them.
                 None if tile.level < SIDES.len() && tile.places.len() >= ENOUGH => rough.push(tile),
                 None => {}
             }
+            tile.places.iter().for_each(|place| self.told[*place as usize] = None);
         }
         rough
     }
@@ -304,41 +314,58 @@ impl<'a> Light<'a> {
             return None;
         }
         let plane = Plane::through(&found);
-        let is_near = |(seen, light, off): &(&Seen, Bands, f32)| {
+        let is_near = |(seen, light, off): &(&Seen, Bands, Bands)| {
             let told = plane.at(seen);
-            (0..3).all(|band| (light[band] - told[band]).abs() <= *off)
+            (0..3).all(|band| (light[band] - told[band]).abs() <= off[band])
         };
         // Beyond what was found nothing is known.
-        let lux = |(_, light, _): &(&Seen, Bands, f32)| luminance(*light);
-        let low = found.iter().map(|one| lux(one) - one.2).fold(f32::INFINITY, f32::min);
-        let high = found.iter().map(|one| lux(one) + one.2).fold(0.0, f32::max);
+        let low = found.iter().map(|(_, light, off)| luminance(*light) - luminance(*off)).fold(f32::INFINITY, f32::min);
+        let high = found.iter().map(|(_, light, off)| luminance(*light) + luminance(*off)).fold(0.0, f32::max);
         let is_between = |place: &u32| (low..=high).contains(&luminance(plane.at(seen(self.view, *place))));
         (found.iter().all(is_near) && tile.places.iter().all(is_between)).then_some(plane)
     }
 
-    /// Tells light of a tile by what was found in it, the more the nearer.
-    fn spread(&mut self, tile: &Tile) {
+    /// Tells light of a tile where no plane does by what was found in it, the more the nearer; of few places, in the `whole` that it is of.
+    fn spread(&mut self, tile: &Tile, whole: &Tile) {
         let lit: Vec<Bands> = {
-            let found = self.found_in(tile);
+            let own = self.found_in(tile);
+            let found = if own.len() < ENOUGH { self.found_in(whole) } else { own };
             let of = |place: &u32| {
                 let point = seen(self.view, *place).place.point;
-                let (mut sum, mut whole) = ([0.0; 3], f64::MIN_POSITIVE);
+                let (mut sum, mut weights) = ([0.0; 3], f64::MIN_POSITIVE);
                 for (seen, light, _) in &found {
                     let weight = 1.0 / seen.place.point.distance_squared(point).max(f64::MIN_POSITIVE);
-                    whole += weight;
+                    weights += weight;
                     (0..3).for_each(|band| sum[band] += weight * f64::from(light[band]));
                 }
-                sum.map(|sum| (sum / whole) as f32)
+                sum.map(|sum| (sum / weights) as f32)
             };
             tile.places.iter().map(of).collect()
         };
-        tile.places.iter().zip(lit).for_each(|(place, light)| self.told[*place as usize] = light);
+        for (place, light) in tile.places.iter().zip(lit) {
+            self.told[*place as usize].get_or_insert(light);
+        }
+    }
+
+    /// Light of all places: what is exact, or else what planes tell, which have less noise than what was found.
+    fn all(self) -> Vec<Bands> {
+        let of = |(found, told): (Option<(Bands, f32)>, Option<Bands>)| match (found, told) {
+            (Some((light, off)), told) => {
+                if off > SMOOTH {
+                    told.unwrap_or(light)
+                } else {
+                    light
+                }
+            }
+            (None, told) => told.unwrap_or([0.0; 3]),
+        };
+        self.found.into_iter().zip(self.told).map(of).collect()
     }
 }
 
 impl Plane {
     /// The plane that is nearest to light at some places, in squares.
-    fn through(found: &[(&Seen, Bands, f32)]) -> Plane {
+    fn through(found: &[(&Seen, Bands, Bands)]) -> Plane {
         let n = found.len() as f64;
         let origin = found.iter().map(|(seen, ..)| seen.place.point).sum::<DVec3>() / n;
         let extent = found.iter().map(|(seen, ..)| seen.place.point.distance(origin)).fold(f64::MIN_POSITIVE, f64::max);
@@ -451,6 +478,9 @@ mod tests {
         let lit = (0..SIZE * 40).map(|k| off(k % 40, k / 40)).sum::<f64>() / f64::from(SIZE * 40);
         let alone = 0.012f64.powi(2) / 12.0;
         assert!(lit < 0.6 * alone, "{lit} of {alone}");
+        // What was found in a smooth square is no noisier than what is told around it.
+        let found = (0..24 * 10).map(|k| off(4 * (k % 10), 4 * (k / 10))).sum::<f64>() / 240.0;
+        assert!(found < 0.75 * alone, "{found} of {alone}");
         assert!((0..SIZE).all(|y| told[(y * SIZE + 50) as usize] == 20.0));
         assert!(count < view.seen.len() / 4, "{count}");
     }

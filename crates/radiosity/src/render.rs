@@ -63,8 +63,8 @@ pub struct View {
     pub illuminance: Vec<f32>,
     /// Places that are seen, spread over the pixels, and their irradiance there.
     pub watched: Vec<(Place, Bands)>,
-    /// Shadow rays per pixel: those that were asked for, or what a deadline left of them.
-    pub shadow_rays: u32,
+    /// Whether a deadline left fewer shadow rays than were asked for, or places without any, which lie between those around them.
+    pub is_hurried: bool,
 }
 
 impl View {
@@ -107,6 +107,8 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         Some(seconds) => {
             let lit = cost(solution, &stations, &options.shadowing, monitor)?;
             let lit = tiles.part() * lit.seconds(f64::from(options.shadowing.rays));
+            // Timing took some of it.
+            let seconds = left().unwrap_or(seconds);
             let gather = (seconds - lit).max(GATHERED * seconds);
             solution.field_on(&looks, light, baked.error, &Timed::new(monitor, Duration::from_secs_f64(gather)))?
         }
@@ -116,13 +118,14 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     // Timed once more: others may have come or gone since.
     let cost = left().map(|_| cost(solution, &stations, &options.shadowing, monitor)).transpose()?;
     let mut shadowing = options.shadowing;
-    let mut is_first = true;
+    let (mut is_first, mut is_hurried) = (true, false);
     let direct = tiles.direct(&indirect, |own| {
         if let (Some(cost), Some(seconds)) = (&cost, left()) {
             // All that follows is planned with the first ones.
             let part = if is_first { tiles.part() } else { own.len() as f64 / stations.len() as f64 };
             let (cost, least) = (cost.of(part), LEAST_SHADOW_RAYS.min(shadowing.rays));
             if !is_first && !pace::suffices(seconds, cost.seconds(f64::from(least))) {
+                is_hurried = true;
                 return Ok(None);
             }
             shadowing.rays = cost.rays(seconds, [least, shadowing.rays].map(f64::from)) as u32;
@@ -148,7 +151,8 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
     };
     let watched = (0..count).map(pick).map(|i| (stations[i].place, irradiance[i])).collect();
-    Ok(View { picture: view.picture(&irradiance), illuminance, watched, shadow_rays: shadowing.rays })
+    is_hurried |= shadowing.rays < options.shadowing.rays;
+    Ok(View { picture: view.picture(&irradiance), illuminance, watched, is_hurried })
 }
 
 /// Casts the camera's rays, fewer of them where a small picture tells that they would take too much of the time.

@@ -151,7 +151,7 @@ fn catalogue_42_a_limit_of_time_leaves_a_whole_answer() {
     let size = RenderOptions { width: 48, height: 48, ..RenderOptions::default() };
     let look = |monitor: &dyn Monitor| render(&baked, &scene.cameras[0], &size, monitor).unwrap();
     let (hurried, usual) = (look(&none), look(&()));
-    assert_eq!((hurried.shadow_rays, usual.shadow_rays), (16, size.shadowing.rays));
+    assert!(hurried.is_hurried && !usual.is_hurried);
     // Of surfaces: few samples in a pixel may miss an edge of the lamp, which outshines all.
     let mean = |view: &View| {
         let lit: Vec<f32> = view.illuminance.iter().copied().filter(|e| e.is_finite()).collect();
@@ -163,7 +163,7 @@ fn catalogue_42_a_limit_of_time_leaves_a_whole_answer() {
     assert!(map.audit.upper < 0.5, "{:?}", map.audit);
     // Where there is time, nothing is spared.
     let hour = Timed::new(&(), Duration::from_secs(3600));
-    assert_eq!(look(&hour).shadow_rays, size.shadowing.rays);
+    assert!(!look(&hour).is_hurried);
     let all = radiosity::lightmap(&baked, Some(20.0), 4096, &hour).unwrap();
     assert!(!all.hurried, "{} texels", all.texels);
 
