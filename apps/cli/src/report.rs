@@ -281,11 +281,13 @@ impl Report {
                     .needed
                     .map_or(String::new(), |texels| format!(", and what was asked would take some {texels:.0}"));
                 let finest = if map.finest > map.density { format!(" to {:.1}", map.finest) } else { String::new() };
-                let (texels, density, twice) = (map.texels, map.density, (2.0 * map.density).ceil());
-                format!(
-                    "the lightmap has {texels} texels, {density:.1}{finest} per metre{needed}; \
-                     --texels-per-metre {twice:.0} comes nearer"
-                )
+                let (texels, density) = (map.texels, map.density);
+                // One that is fine where light is rough is not beaten by a little more everywhere.
+                let advice = match map.finest > density {
+                    true => "no more are made unasked, --texels-per-metre sets one density everywhere".to_owned(),
+                    false => format!("--texels-per-metre {:.0} comes nearer", (2.0 * density).ceil()),
+                };
+                format!("the lightmap has {texels} texels, {density:.1}{finest} per metre{needed}; {advice}")
             }
             None => format!(
                 "vertices are {:.3} m apart, try --element-size {:.3}",

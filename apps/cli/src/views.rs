@@ -113,10 +113,10 @@ pub fn camera(scene: &Scene, tracer: &Tracer, asked: &PictureArguments) -> Resul
     let by_name = scene.cameras.iter().find(|c| c.name == *wanted);
     let by_number = wanted.parse::<usize>().ok().and_then(|n| scene.cameras.get(n));
     by_name.or(by_number).cloned().ok_or_else(|| {
-        let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} '{}'", c.name)).collect();
+        let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} = '{}'", c.name)).collect();
         let there = match names.is_empty() {
             true => "it has none; --eye and --target place one".to_owned(),
-            false => format!("it has {}", names.join(", ")),
+            false => format!("its cameras: {}", names.join(", ")),
         };
         Failure::input(format!("--camera {wanted}: the scene has no such camera; {there}"))
     })

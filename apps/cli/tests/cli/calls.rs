@@ -52,7 +52,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("bake picture.stl", ".glb, .gltf or .obj"),
         ("bake -o out.gltf", "must end in .glb"),
         ("bake --report out.txt", "must end in .json or .html"),
-        ("bake --camera 7", "it has 0 'front'"),
+        ("bake --camera 7", "its cameras: 0 = 'front'"),
         ("bake --element-size -1", "above 0"),
         ("bake --texels-per-metre -5", "above 0"),
         ("bake --error -1%", "such as 1%"),
