@@ -1,4 +1,4 @@
-//! A picture of a solution: direct light found at places that pixels show ([`crate::pixels`]), indirect light from the continuous field.
+//! A picture of a solution: direct light found at places that pixels show (`pixels.rs`), indirect light from the continuous field.
 
 use crate::answer::Station;
 use crate::measure::{certify, most_paths};
