@@ -29,14 +29,19 @@ const FOUND: [usize; 2] = [9, 5];
 /// So many places tell of a plane at least: two more than it has unknowns.
 const ENOUGH: usize = 5;
 
-/// By how much light may be off the plane, relative to all the light there: half a step of what a display of 8 bits shows; and three times the
-/// noise of 256 shadow rays about where rays leave some, and with others over their root as much. Light below a part of the mean counts
-/// as if it was as much: in the dark little is seen. With twice as much walls show the squares.
+/// By how much light may be off the plane, relative to all the light there: half a step of what a display of 8 bits shows.
 const SMOOTH: f32 = 0.004;
+
+/// The same where shadow rays leave noise: some three times that of 256, and of others by their root; no more than twice that, as with four
+/// times, which 16 rays would have, squares were seen in penumbrae.
 const NOISE_OF_A_RAY: f32 = 0.012 * 16.0;
-/// With more noise than so much, planes that fit would be seen as squares.
 const NOISIEST: f32 = 0.024;
+
+/// Light below this part of the mean counts as if it was as much: in the dark little is seen.
 const DARK: f64 = 0.1;
+
+/// Squared distances of places, m², below which they count as one.
+const NEAREST: f64 = 1e-30;
 
 /// Places lie on one surface if their normals differ by less than this cosine, that of two degrees and a half, and so does the way from
 /// one to the other from being along it.
@@ -327,36 +332,32 @@ impl<'a> Light<'a> {
 
     /// Tells light of a tile where no plane does by what was found in it, the more the nearer; of few places, in the `whole` that it is of.
     fn spread(&mut self, tile: &Tile, whole: &Tile) {
+        let is_known = |place: u32| self.is_found(place) || self.told[place as usize].is_some();
+        let unknown: Vec<u32> = tile.places.iter().copied().filter(|place| !is_known(*place)).collect();
         let lit: Vec<Bands> = {
             let own = self.found_in(tile);
             let found = if own.len() < ENOUGH { self.found_in(whole) } else { own };
             let of = |place: &u32| {
                 let point = seen(self.view, *place).place.point;
-                let (mut sum, mut weights) = ([0.0; 3], f64::MIN_POSITIVE);
+                let (mut sum, mut weights) = ([0.0; 3], 0.0);
                 for (seen, light, _) in &found {
-                    let weight = 1.0 / seen.place.point.distance_squared(point).max(f64::MIN_POSITIVE);
+                    let weight = 1.0 / seen.place.point.distance_squared(point).max(NEAREST);
                     weights += weight;
                     (0..3).for_each(|band| sum[band] += weight * f64::from(light[band]));
                 }
-                sum.map(|sum| (sum / weights) as f32)
+                sum.map(|sum| (sum / f64::max(weights, f64::MIN_POSITIVE)) as f32)
             };
-            tile.places.iter().map(of).collect()
+            unknown.iter().map(of).collect()
         };
-        for (place, light) in tile.places.iter().zip(lit) {
-            self.told[*place as usize].get_or_insert(light);
+        for (place, light) in unknown.into_iter().zip(lit) {
+            self.told[place as usize] = Some(light);
         }
     }
 
     /// Light of all places: what is exact, or else what planes tell, which have less noise than what was found.
     fn all(self) -> Vec<Bands> {
         let of = |(found, told): (Option<(Bands, f32)>, Option<Bands>)| match (found, told) {
-            (Some((light, off)), told) => {
-                if off > SMOOTH {
-                    told.unwrap_or(light)
-                } else {
-                    light
-                }
-            }
+            (Some((light, off)), told) => told.filter(|_| off > SMOOTH).unwrap_or(light),
             (None, told) => told.unwrap_or([0.0; 3]),
         };
         self.found.into_iter().zip(self.told).map(of).collect()
@@ -490,15 +491,22 @@ mod tests {
     fn what_there_is_no_time_for_is_told_by_what_is_around() {
         let view = floors(60);
         let light = |[x, y]: [u32; 2]| if (x + y) % 23 < 9 { 50.0 } else { 80.0 };
-        let mut is_first = true;
-        let told = Tiles::new(&view).direct(&vec![[0.0; 3]; view.seen.len()], |places| {
-            let light = places.iter().map(|&place| [light(pixel(&view, place)); 3]).collect();
-            let found = Lit { light, is_exact: vec![true; places.len()] };
-            Ok(std::mem::take(&mut is_first).then_some((found, 256)))
-        });
-        let told = told.unwrap();
-        assert!(told.iter().all(|[e, ..]| (49.9..80.1).contains(e)));
-        assert!(told.iter().any(|[e, ..]| (60.0..70.0).contains(e)));
+        for is_exact in [true, false] {
+            let mut first = Vec::new();
+            let told = Tiles::new(&view).direct(&vec![[0.0; 3]; view.seen.len()], |places| {
+                let light = places.iter().map(|&place| [light(pixel(&view, place)); 3]).collect();
+                let found = Lit { light, is_exact: vec![is_exact; places.len()] };
+                let is_first = first.is_empty();
+                first.extend(places.iter().copied().filter(|_| is_first));
+                Ok(is_first.then_some((found, 16)))
+            });
+            let told = told.unwrap();
+            assert!(told.iter().all(|[e, ..]| (49.9..80.1).contains(e)));
+            assert!(told.iter().any(|[e, ..]| (60.0..70.0).contains(e)));
+            // What was found stays, unless a plane has less noise.
+            let stays = |&&place: &&u32| (told[place as usize][0] - light(pixel(&view, place))).abs() < 2.0;
+            assert_eq!(first.iter().filter(stays).count(), first.len());
+        }
     }
 
     /// A picture of the Cornell box with light found at some places is the one with light found at all, as far as one can see.

@@ -268,6 +268,9 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         let error = if is_dark { 0.0 } else { f64::INFINITY };
         return Audit { points, paths, error, upper: error, ..Audit::default() };
     }
+    if m.iter().flatten().any(|e| !e.is_finite()) {
+        return Audit { points, paths, error: f64::INFINITY, upper: f64::INFINITY, ..Audit::default() };
+    }
     let n = points as f64;
     let mean = |f: &dyn Fn(&Judged) -> f64| places.iter().map(f).sum::<f64>() / n.max(1.0);
     let over_places = |f: &dyn Fn(&Judged) -> f64| {
@@ -323,6 +326,16 @@ mod tests {
         assert!(lucky.error > 0.03 && !lucky.is_above(0.01), "{lucky:?}");
         let wrong = audit(1.03, 0);
         assert!((wrong.error - 0.03).abs() < 1e-6 && wrong.is_above(0.01), "{wrong:?}");
+    }
+
+    /// An answer that is no number at one place is infinitely wrong; it was 0 % off.
+    #[test]
+    fn what_is_no_number_is_wrong() {
+        for e in [f32::NAN, f32::INFINITY] {
+            let light: Vec<Bands> = (0..500).map(|k| [if k == 7 { e } else { 1.0 }; 3]).collect();
+            let audit = judge((&[1.0; 1000], 2), &light, None, 1);
+            assert!(audit.error.is_infinite() && audit.upper.is_infinite(), "{audit:?}");
+        }
     }
 
     /// Of few points that are looked at often the bound is above the error in 95 % of cases at least, however large that is and wherever: less three
