@@ -27,6 +27,24 @@ fn dark_beside_bright(sheet: bool) -> Scene {
 }
 
 /// Nothing leaks through walls of zero thickness.
+/// Where a vertex lies that was written.
+fn place(scene: &Scene, primitive: &LitPrimitive, vertex: u32) -> DVec3 {
+    let LitVertex { corners, weights } = &primitive.vertices[vertex as usize];
+    let first = scene.objects[primitive.object].vertices.start;
+    let part = |k: usize| f64::from(weights[k]) * scene.positions[first + corners[k] as usize];
+    (0..3).map(part).sum()
+}
+
+/// What is read of a map at so many times as many places, spread over a triangle of it: weights of the second and the third corner, and
+/// the light.
+fn read_over(map: &Lightmap, page: usize, [a, b, c]: [Vec2; 3], side: u16) -> impl Iterator<Item = ([f32; 2], f32)> {
+    (0..side * side).map(move |k| {
+        let [u, v] = [k % side, k / side].map(|k| f32::from(k) / f32::from(side - 1));
+        let u = u * (1.0 - v);
+        ([u, v], look_up(map.pages[page], &map.irradiance[page], a + u * (b - a) + v * (c - a))[1])
+    })
+}
+
 #[test]
 fn no_light_leaks_through_walls_of_zero_thickness() {
     for sheet in [false, true] {
@@ -74,12 +92,9 @@ fn no_light_leaks_into_texels_and_vertices() {
             match &primitive.light {
                 Light::Lightmap { page, uv } => {
                     for corners in &primitive.triangles {
-                        let [a, b, c] = corners.map(|v| Vec2::from(uv[v as usize]));
-                        for k in 0..100u16 {
-                            let (u, v) = (f32::from(k % 10) / 9.0, f32::from(k / 10) / 9.0);
-                            let at = a + u * (1.0 - v) * (b - a) + v * (c - a);
-                            let read = look_up(map.pages[*page], &map.irradiance[*page], at);
-                            count(primitive.object, primitive.flipped, read[1]);
+                        let corners = corners.map(|v| Vec2::from(uv[v as usize]));
+                        for (_, read) in read_over(&map, *page, corners, 10) {
+                            count(primitive.object, primitive.flipped, read);
                         }
                     }
                 }
@@ -186,23 +201,13 @@ fn assert_no_light_leaks(mut scene: Scene, middle: Range<f64>, named: &str) {
     let map = lightmap(&baked, Some(10.0), 4096, &()).unwrap();
     let vertices = vertex_light(&baked, &()).unwrap();
     for primitive in map.primitives.iter().chain(&vertices.primitives) {
-        let object = &scene.objects[primitive.object];
         for corners in &primitive.triangles {
-            let place = |v: u32| {
-                let vertex = &primitive.vertices[v as usize];
-                let at = vertex.corners.map(|c| scene.positions[object.vertices.start + c as usize]);
-                (0..3).map(|k| f64::from(vertex.weights[k]) * at[k]).sum::<DVec3>()
-            };
-            let [a, b, c] = corners.map(place);
+            let [a, b, c] = corners.map(|v| place(&scene, primitive, v));
             let dark = is_dark(primitive.object, (a + b + c).x / 3.0, primitive.flipped);
             match &primitive.light {
                 Light::Lightmap { page, uv } => {
-                    let [a, b, c] = corners.map(|v| Vec2::from(uv[v as usize]));
-                    for k in 0..100u16 {
-                        let (u, v) = (f32::from(k % 10) / 9.0, f32::from(k / 10) / 9.0);
-                        let at = a + u * (1.0 - v) * (b - a) + v * (c - a);
-                        count(2, dark, look_up(map.pages[*page], &map.irradiance[*page], at)[1]);
-                    }
+                    let corners = corners.map(|v| Vec2::from(uv[v as usize]));
+                    read_over(&map, *page, corners, 10).for_each(|(_, read)| count(2, dark, read));
                 }
                 Light::Vertex { irradiance } => {
                     corners.iter().for_each(|v| count(3, dark, irradiance[*v as usize][1]));
@@ -266,20 +271,11 @@ fn what_is_seen_between_the_middles_of_texels_is_lit() {
     let mut count = 0;
     for primitive in map.primitives.iter().filter(|p| scene.objects[p.object].name == "post") {
         let Light::Lightmap { page, uv } = &primitive.light else { panic!("no lightmap") };
-        let object = &scene.objects[primitive.object];
         for corners in &primitive.triangles {
-            let place = |v: u32| {
-                let vertex = &primitive.vertices[v as usize];
-                let at = vertex.corners.map(|c| scene.positions[object.vertices.start + c as usize]);
-                (0..3).map(|k| f64::from(vertex.weights[k]) * at[k]).sum::<DVec3>()
-            };
-            let ([a, b, c], [p, q, r]) = (corners.map(place), corners.map(|v| Vec2::from(uv[v as usize])));
-            for k in 0..400u16 {
-                let (u, v) = (f32::from(k % 20) / 19.0, f32::from(k / 20) / 19.0);
-                let (u, v) = (u * (1.0 - v), v);
+            let [a, b, c] = corners.map(|v| place(&scene, primitive, v));
+            for ([u, v], read) in read_over(&map, *page, corners.map(|v| Vec2::from(uv[v as usize])), 20) {
                 let z = (a + f64::from(u) * (b - a) + f64::from(v) * (c - a)).z;
                 if (0.575..0.595).contains(&z) {
-                    let read = look_up(map.pages[*page], &map.irradiance[*page], p + u * (q - p) + v * (r - p))[1];
                     assert!((0.6 * truth..1.4 * truth).contains(&read), "{read} of {truth} at {z}");
                     count += 1;
                 }

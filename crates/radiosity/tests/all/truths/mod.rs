@@ -1,12 +1,12 @@
 //! The engine against closed forms and independent references.
 
 use glam::{DVec3, Vec2};
-use radiosity::io::gltf_out::Light;
+use radiosity::io::gltf_out::{Light, LitPrimitive, LitVertex};
 use radiosity::transport::{ElementReceivers, Exposure, HitTable, IdSpace, Shadowing};
 use radiosity::view::lightmap::look_up;
 use radiosity::{
-    BakeOptions, Elements, Material, MeasureOptions, Mesh, PointLight, PointLightKind, Scene, Side, Sky, SkyPatches,
-    Solution, SolveOptions, Tracer, Up, bake, lightmap, luminance, measure, vertex_light,
+    BakeOptions, Elements, Lightmap, Material, MeasureOptions, Mesh, PointLight, PointLightKind, Scene, Side, Sky,
+    SkyPatches, Solution, SolveOptions, Tracer, Up, bake, lightmap, luminance, measure, vertex_light,
 };
 use serde_json::Value;
 use std::ops::Range;
