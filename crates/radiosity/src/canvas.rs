@@ -193,8 +193,8 @@ impl<'b, 'a> Canvas<'b, 'a> {
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error> {
         let all = self.stations(texels);
-        let shown: Vec<usize> =
-            (0..texels.len()).into_par_iter().filter(|&i| !is_hidden(self.solution, &all[i])).collect();
+        let hidden: Vec<bool> = all.par_iter().map(|station| is_hidden(self.solution, station)).collect();
+        let shown: Vec<usize> = (0..texels.len()).filter(|&i| !hidden[i]).collect();
         let (own, at): (Vec<Texel>, Vec<Station>) = shown.iter().map(|&i| (texels[i], all[i])).unzip();
         let sheet = Sheet { atlas, page, texels: &own };
         let found = texels::light(judge.baked(), sheet, &at, (judge.gathers(), judge.thinned()), monitor)?;
@@ -203,11 +203,9 @@ impl<'b, 'a> Canvas<'b, 'a> {
             light[i] = std::array::from_fn(|k| d[k] + p.light[k]);
             smooth[i] = (p.own < SMOOTH).then_some(p.light);
         }
-        let mut doubtful = vec![true; texels.len()];
-        shown.iter().for_each(|&i| doubtful[i] = false);
-        for (is_doubtful, station) in doubtful.iter_mut().zip(&all).filter(|(is_doubtful, _)| **is_doubtful) {
-            *is_doubtful = is_shown_in_part(self.solution, station);
-        }
+        let is_doubtful =
+            |(is_hidden, station): (&bool, &Station)| *is_hidden && is_shown_in_part(self.solution, station);
+        let doubtful = hidden.iter().zip(&all).map(is_doubtful).collect();
         Ok(Lit { light, smooth, doubtful })
     }
 

@@ -79,8 +79,8 @@ impl Solution<'_> {
     }
 
     /// The field of `light` by element, in halves, where cells are looked at, each as often as `looks` says. Where its noise
-    /// there is more than `error`, or than is visible, these and what is around them gather anew, with more rays until
-    /// it is not, or that brings nothing, or there are 4,096 or more for each cell.
+    /// there is more than `error`, or than is visible, these and what is around them gather anew, adding to those rays
+    /// until it is not, or that brings nothing, or there are 4,096 or more for each cell.
     ///
     /// # Errors
     /// [`Error::Stopped`].
@@ -112,7 +112,8 @@ impl Solution<'_> {
         }
         let mut noises = vec![noise(&light)];
         while let Some(&last) = noises.last().filter(|last| **last > wanted)
-            && had.max(first) <= MOST_RAYS
+            && had < MOST_RAYS
+            && first <= MOST_RAYS
             && !brought_nothing(&noises)
         {
             let [least, mut rays] = match had {

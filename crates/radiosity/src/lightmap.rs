@@ -13,7 +13,7 @@ use radiosity_io::image_out::encode_png;
 use radiosity_scene::display::srgb;
 use radiosity_scene::{Bands, Mesh, Side};
 use radiosity_view::Audit;
-use radiosity_view::lightmap::{Allotment, Atlas, LightmapError, UnwrapParams};
+use radiosity_view::lightmap::{Allotment, Atlas, Detail, LightmapError, UnwrapParams};
 use std::collections::HashMap;
 
 /// A lightmap: pages of linear irradiance, and the primitives that refer to them.
@@ -144,11 +144,8 @@ pub fn lightmap(
     if texels_per_metre.is_some() {
         judge.pace(texels, EDGES, monitor)?;
     }
-    let mut drawn = canvas.draw(&params, &judge, None, monitor)?;
-    let mut audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
-    let mut rounds = vec![drawn.round(&audit)];
-    let finest_of = |finer: &[f64]| params.texels_per_metre * finer.iter().fold(1.0, |most: f64, f| f.max(most));
-    let mut finest = finest_of(&canvas.charts.finer);
+    let mut last = attempt(&canvas, &params, &mut judge, None, monitor)?;
+    let mut rounds = vec![last.drawn.round(&last.audit)];
     // Finer texels may be read back worse: where those lie that stand for small things is chance.
     let mut best: Option<Attempt> = None;
 
@@ -159,10 +156,10 @@ pub fn lightmap(
         && rounds.len() <= ROUNDS
         && !is_stalled(&rounds)
         && !is_over(monitor)
-        && (audit.upper <= baked.error || !baked.achieved || judge.has_time(STEP * texels, EDGES, monitor))
+        && (last.audit.upper <= baked.error || !baked.achieved || judge.has_time(STEP * texels, EDGES, monitor))
     {
-        let Some(goal) = judge.goal(&audit, monitor)? else { break };
-        let detail = canvas.detail(&drawn, tolerance);
+        let Some(goal) = judge.goal(&last.audit, monitor)? else { break };
+        let detail = canvas.detail(&last.drawn, tolerance);
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
         let whole = allot(goal.left);
         needed = whole.as_ref().map(|whole| whole.texels);
@@ -178,26 +175,23 @@ pub fn lightmap(
         let Some(step) = steps.filter_map(allot).find(is_near) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
-        let next = canvas.draw(&params, &judge, (!goal.relight).then_some((&drawn, &detail)), monitor)?;
-        let judged = judge.audit(monitor, |station| canvas.read(&next, station))?;
-        rounds.push(next.round(&judged));
-        let before = Attempt {
-            drawn: std::mem::replace(&mut drawn, next),
-            audit: std::mem::replace(&mut audit, judged),
-            finest: std::mem::replace(&mut finest, finest_of(&canvas.charts.finer)),
-        };
-        let upper = best.as_ref().map_or(audit.upper, |best| best.audit.upper.min(audit.upper));
-        if before.audit.upper < upper {
+        let known = (!goal.relight).then_some((&last.drawn, &detail));
+        let next = attempt(&canvas, &params, &mut judge, known, monitor)?;
+        rounds.push(next.drawn.round(&next.audit));
+        let before = std::mem::replace(&mut last, next);
+        let is_better = |than: &Attempt| before.audit.upper < than.audit.upper;
+        if is_better(&last) && best.as_ref().is_none_or(is_better) {
             best = Some(Attempt { drawn: before.drawn.handed_out(), ..before });
         }
     }
-    if let Some(mut best) = best {
+    if let Some(mut best) = best.filter(|best| best.audit.upper < last.audit.upper) {
         // By all that the referee knows now.
         best.audit = judge.audit(monitor, |station| canvas.read(&best.drawn, station))?;
-        if best.audit.upper < audit.upper {
-            Attempt { drawn, audit, finest } = best;
+        if best.audit.upper < last.audit.upper {
+            last = best;
         }
     }
+    let Attempt { drawn, audit, finest } = last;
 
     Ok(Lightmap {
         primitives: primitives(&canvas, &drawn.atlas),
@@ -213,6 +207,20 @@ pub fn lightmap(
         pages: drawn.atlas.pages,
         irradiance: drawn.irradiance,
     })
+}
+
+/// Draws a map, as far as it is not known from one before, and judges it.
+fn attempt(
+    canvas: &Canvas,
+    params: &UnwrapParams,
+    judge: &mut Judge,
+    known: Option<(&Drawn, &Detail)>,
+    monitor: &dyn Monitor,
+) -> Result<Attempt, Error> {
+    let drawn = canvas.draw(params, judge, known, monitor)?;
+    let audit = judge.audit(monitor, |station| canvas.read(&drawn, station))?;
+    let finest = params.texels_per_metre * canvas.charts.finer.iter().fold(1.0, |most: f64, f| f.max(most));
+    Ok(Attempt { drawn, audit, finest })
 }
 
 /// The faces as primitives that refer to the pages.
