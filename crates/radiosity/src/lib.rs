@@ -21,6 +21,7 @@ pub mod compare;
 mod cornell;
 mod displayed;
 mod division;
+mod edges;
 mod element_light;
 mod equation;
 mod error;

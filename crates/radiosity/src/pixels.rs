@@ -38,7 +38,7 @@ const NOISE_OF_A_RAY: f32 = 0.012 * 16.0;
 const NOISIEST: f32 = 0.024;
 
 /// Light below this part of the mean counts as if it was as much: in the dark little is seen.
-const DARK: f64 = 0.1;
+pub(crate) const DARK: f64 = 0.1;
 
 /// Squared distances of places, m², below which they count as one.
 const NEAREST: f64 = 1e-30;
@@ -109,7 +109,7 @@ impl<'a> Tiles<'a> {
         (FOLLOWING * first / self.view.seen.len().max(1) as f64).min(1.0)
     }
 
-    /// Direct light of all places, beside which there is `indirect` light. `light_of` finds it at some of them, and says with how many
+    /// Direct light of all places, beside which there is `indirect` light, and whether it has no noise that a plane has not evened out. `light_of` finds it at some of them, and says with how many
     /// shadow rays; or nothing where there is no time for it, and it is told by what is around.
     ///
     /// # Errors
@@ -118,7 +118,7 @@ impl<'a> Tiles<'a> {
         &self,
         indirect: &[Bands],
         mut light_of: impl FnMut(&[u32]) -> Result<Option<(Lit, u32)>, Error>,
-    ) -> Result<Vec<Bands>, Error> {
+    ) -> Result<Lit, Error> {
         let Tiles { view, wholes } = self;
         let mut at: HashMap<[u32; 2], Vec<usize>> = HashMap::new();
         wholes.iter().for_each(|tile| at.entry(tile.square).or_default().push(tile.whole));
@@ -202,18 +202,18 @@ fn deal(
     tiles
 }
 
-fn seen(view: &ViewRays, place: u32) -> &Seen {
+pub(crate) fn seen(view: &ViewRays, place: u32) -> &Seen {
     &view.seen[place as usize]
 }
 
 /// Column and row of the pixel that shows a place.
-fn pixel(view: &ViewRays, place: u32) -> [u32; 2] {
+pub(crate) fn pixel(view: &ViewRays, place: u32) -> [u32; 2] {
     let pixel = seen(view, place).pixel;
     [pixel % view.width, pixel / view.width]
 }
 
 /// Whether two places lie on a surface that is nearly flat there, on the same side of it.
-fn lies_on(a: &Seen, b: &Seen) -> bool {
+pub(crate) fn lies_on(a: &Seen, b: &Seen) -> bool {
     let between = b.place.point - a.place.point;
     let off = between.dot(a.place.normal).abs().max(between.dot(b.place.normal).abs());
     a.behind == b.behind && a.place.normal.dot(b.place.normal) > FLAT && off <= ALONG * between.length()
@@ -355,12 +355,13 @@ impl<'a> Light<'a> {
     }
 
     /// Light of all places: what is exact, or else what planes tell, which have less noise than what was found.
-    fn all(self) -> Vec<Bands> {
+    fn all(self) -> Lit {
         let of = |(found, told): (Option<(Bands, f32)>, Option<Bands>)| match (found, told) {
-            (Some((light, off)), told) => told.filter(|_| off > SMOOTH).unwrap_or(light),
-            (None, told) => told.unwrap_or([0.0; 3]),
+            (Some((light, off)), told) if off <= SMOOTH || told.is_none() => (light, off <= SMOOTH),
+            (_, told) => (told.unwrap_or([0.0; 3]), true),
         };
-        self.found.into_iter().zip(self.told).map(of).collect()
+        let (light, is_exact) = self.found.into_iter().zip(self.told).map(of).unzip();
+        Lit { light, is_exact }
     }
 }
 
@@ -413,10 +414,11 @@ mod tests {
             let [x, y] = [pixel % SIZE, pixel / SIZE];
             let point = DVec3::new(f64::from(x), f64::from(y), if x < step { 0.0 } else { -30.0 });
             let place = Place { point, normal: DVec3::Z, triangle: 0 };
-            Seen { pixel, place, uv: DVec2::ZERO, side: Side::Front, response: [1.0; 3], behind: false }
+            Seen { pixel, place, uv: DVec2::ZERO, side: Side::Front, response: [1.0; 3], behind: false, glows: false }
         };
         let n = SIZE * SIZE;
-        ViewRays { width: SIZE, height: SIZE, seen: (0..n).map(place).collect(), own: vec![[0.0; 3]; n as usize] }
+        let (seen, own) = ((0..n).map(place).collect(), vec![[0.0; 3]; n as usize]);
+        ViewRays { width: SIZE, height: SIZE, grid: 1, seen, own, mixed: Vec::new() }
     }
 
     /// The light that is told where `light` is what each pixel has, whether exactly, and of how many pixels it was asked.
@@ -428,7 +430,7 @@ mod tests {
             Ok(Some((Lit { light, is_exact: vec![is_exact; places.len()] }, 256)))
         };
         let told = Tiles::new(view).direct(&vec![[0.0; 3]; view.seen.len()], light_of).unwrap();
-        (told.into_iter().map(|[e, ..]| e).collect(), count)
+        (told.light.into_iter().map(|[e, ..]| e).collect(), count)
     }
 
     /// The largest part by which told light is off, and the part of the pixels that it was found at.
@@ -500,7 +502,7 @@ mod tests {
                 first.extend(places.iter().copied().filter(|_| is_first));
                 Ok(is_first.then_some((found, 16)))
             });
-            let told = told.unwrap();
+            let told = told.unwrap().light;
             assert!(told.iter().all(|[e, ..]| (49.9..80.1).contains(e)));
             assert!(told.iter().any(|[e, ..]| (60.0..70.0).contains(e)));
             // What was found stays, unless a plane has less noise.
@@ -531,7 +533,7 @@ mod tests {
             let places: Vec<Place> = own.iter().map(|place| places[*place as usize]).collect();
             Ok(Some((solution.direct_by(&places, &shadowing, 0, &())?, shadowing.rays)))
         });
-        let some = some.unwrap();
+        let some = some.unwrap().light;
         let squares = |of: &dyn Fn(usize) -> f32| (0..all.len()).map(|i| f64::from(of(i)).powi(2)).sum::<f64>();
         let off = squares(&|i| luminance(some[i]) - luminance(all[i]));
         let whole = squares(&|i| luminance(all[i]) + luminance(indirect[i]));

@@ -1,6 +1,7 @@
 //! A picture of a solution: direct light found at places that pixels show (`pixels.rs`), indirect light from the continuous field.
 
 use crate::answer::Station;
+use crate::edges::Edges;
 use crate::measure::{certify, most_paths};
 use crate::monitor::{Monitor, Timed};
 use crate::pace::{self, Cost};
@@ -45,6 +46,12 @@ const SMALLER: u32 = 16;
 
 /// Shadow rays that a part of the pixels is timed with: enough to tell what each takes.
 const TIMED_SHADOW_RAYS: u32 = 64;
+
+/// Shadow rays of each sample of a pixel at the edge of a shadow: sixteen have together what a place has.
+const RAYS_OF_A_SAMPLE: u32 = 16;
+
+/// What edges of shadows take of what direct light of all places would: so it is in a furnished office.
+const EDGES: f64 = 0.06;
 
 /// Part of the time that cells that are seen may gather in, where it does not do for all: shadows and what is reflected are seen alike.
 const GATHERED: f64 = 0.5;
@@ -106,7 +113,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         None => solution.field_on(&looks, light, baked.error, monitor)?,
         Some(seconds) => {
             let lit = cost(solution, &stations, &options.shadowing, monitor)?;
-            let lit = tiles.part() * lit.seconds(f64::from(options.shadowing.rays));
+            let lit = (tiles.part() + EDGES) * lit.seconds(f64::from(options.shadowing.rays));
             // Timing took some of it.
             let seconds = left().unwrap_or(seconds);
             let gather = (seconds - lit).max(GATHERED * seconds);
@@ -122,7 +129,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     let direct = tiles.direct(&indirect, |own| {
         if let (Some(cost), Some(seconds)) = (&cost, left()) {
             // All that follows is planned with the first ones.
-            let part = if is_first { tiles.part() } else { own.len() as f64 / stations.len() as f64 };
+            let part = if is_first { tiles.part() + EDGES } else { own.len() as f64 / stations.len() as f64 };
             let (cost, least) = (cost.of(part), LEAST_SHADOW_RAYS.min(shadowing.rays));
             if !is_first && !pace::suffices(seconds, cost.seconds(f64::from(least))) {
                 is_hurried = true;
@@ -134,8 +141,17 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         let places: Vec<Place> = own.iter().map(|place| stations[*place as usize].place).collect();
         Ok(Some((solution.direct_by(&places, &shadowing, 0, monitor)?, shadowing.rays)))
     })?;
-    let both = |(h, d): (&Bands, &Bands)| std::array::from_fn(|band| h[band] + d[band]);
-    let irradiance: Vec<Bands> = indirect.iter().zip(&direct).map(both).collect();
+    let both = |(h, d): (&Bands, &Bands)| -> Bands { std::array::from_fn(|band| h[band] + d[band]) };
+    let of_places: Vec<Bands> = indirect.iter().zip(&direct.light).map(both).collect();
+    let edges = Edges::new(&view, &indirect, direct);
+    let of_sample = Shadowing { rays: RAYS_OF_A_SAMPLE.min(shadowing.rays), ..shadowing };
+    let has_time = |samples: f64| {
+        let cost = cost.as_ref().map(|cost| cost.of(samples / stations.len() as f64));
+        let suffices = |(cost, left): (Cost, f64)| pace::suffices(left, cost.seconds(f64::from(of_sample.rays)));
+        cost.zip(left()).is_none_or(suffices)
+    };
+    let (softened, is_whole) = soften(edges, has_time, (solution, camera), &of_sample, monitor)?;
+    let irradiance: Vec<Bands> = indirect.iter().zip(&softened).map(both).collect();
     let pixels = view.own.len();
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
     for (seen, e) in view.seen.iter().zip(&irradiance) {
@@ -150,9 +166,25 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         let jitter = f64::from(unit(hash(baked.seed ^ hash(i as u32))));
         ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
     };
-    let watched = (0..count).map(pick).map(|i| (stations[i].place, irradiance[i])).collect();
-    is_hurried |= shadowing.rays < options.shadowing.rays;
+    let watched = (0..count).map(pick).map(|i| (stations[i].place, of_places[i])).collect();
+    is_hurried |= !is_whole || shadowing.rays < options.shadowing.rays;
     Ok(View { picture: view.picture(&irradiance), illuminance, watched, is_hurried })
+}
+
+/// Direct light with its edges within pixels, as far as there is time for so many samples; whether there was for all.
+fn soften(
+    mut edges: Edges,
+    has_time: impl Fn(f64) -> bool,
+    (solution, camera): (&Solution, &Camera),
+    shadowing: &Shadowing,
+    monitor: &dyn Monitor,
+) -> Result<(Vec<Bands>, bool), Error> {
+    let mut sharp = edges.sharp();
+    while !sharp.is_empty() && has_time(edges.samples(&sharp)) {
+        sharp = edges
+            .sample((solution.tracer(), camera), &sharp, |places| solution.direct_by(places, shadowing, 0, monitor))?;
+    }
+    Ok((edges.light(), sharp.is_empty()))
 }
 
 /// Casts the camera's rays, fewer of them where a small picture tells that they would take too much of the time.

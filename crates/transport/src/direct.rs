@@ -539,13 +539,12 @@ impl Scratch<'_> {
         let (mut reached, mut outcomes) = (offset, spots[index].settled);
         for (number, part) in parts.iter().enumerate() {
             let l = part.light;
-            outcomes |= SAMPLED;
             let expected = parts.expected(part, rays);
             let before = reached.floor();
             reached += expected;
             let n = (reached.floor() - before) as u32;
             if n == 0 {
-                outcomes |= CHANCE;
+                outcomes |= CHANCE | SAMPLED;
                 continue;
             }
             let samples = (&Sequence::new(seed, DIRECT + 1 + l as u32), used[l], n);
@@ -555,7 +554,7 @@ impl Scratch<'_> {
             if expected < 1.0 {
                 // It came about with this probability.
                 e = e.map(|e| e / expected);
-                outcomes |= CHANCE;
+                outcomes |= CHANCE | SAMPLED;
             }
             outcomes |= outcome;
             (0..3).for_each(|band| visible[l][band] += e[band]);

@@ -17,7 +17,7 @@ pub const LIT: u8 = 1;
 pub const DARK: u8 = 2;
 /// What was found would be noisy even if all shadow rays had come through.
 pub const CHANCE: u8 = 4;
-/// It was asked by shadow rays: others might find something else.
+/// It was asked by shadow rays, and others might find something else: there is not one line of sight alone.
 pub const SAMPLED: u8 = 8;
 
 /// Luminance of a sum that is kept in double precision.
@@ -35,9 +35,9 @@ pub fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, n: u32, sa
     }
     let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
     let ray = tracer.ray(place, direction, length);
-    let n = if tracer.is_opaque() { 1 } else { n };
+    let (n, chance) = if tracer.is_opaque() { (1, 0) } else { (n, SAMPLED) };
     let clear = (0..n).filter(|&i| length <= 0.0 || !tracer.blocked(&ray, salt ^ hash(i))).count();
-    let outcome = if clear > 0 { LIT } else { 0 } | if clear < n as usize { DARK } else { 0 };
+    let outcome = chance | if clear > 0 { LIT } else { 0 } | if clear < n as usize { DARK } else { 0 };
     (arriving.map(|e| f64::from(e) * cosine * clear as f64 / f64::from(n)), outcome)
 }
 
@@ -74,7 +74,7 @@ pub fn from_few(
         return ([0.0; 3], 0);
     }
     let (mut visible, mut sampled) = ([0f64; 3], [0f64; 3]);
-    let mut outcome = 0;
+    let mut outcome = SAMPLED;
     for index in first..first + n {
         let uv = sequence.pair(index).map(f64::from);
         let Some((piece, target, weight)) = sample_one((pieces, factors), place, uv) else {
@@ -115,7 +115,7 @@ pub fn from_many(
     salt: u32,
 ) -> ([f64; 3], u8) {
     let mut sum = [0f64; 3];
-    let mut outcome = CHANCE;
+    let mut outcome = CHANCE | SAMPLED;
     for index in first..first + n {
         let [u, v] = sequence.pair(index);
         let mut u = f64::from(u);

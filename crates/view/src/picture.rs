@@ -2,8 +2,8 @@
 //!
 //! A pixel is sampled on a 4 × 4 grid. Samples that see the same smooth surface share one evaluation of irradiance,
 //! because light changes slowly within a pixel where edges do not; reflectance is looked up at each. Edges come out
-//! smooth at the price of little more than one evaluation per pixel. Of a sheet that transmits light the other side is
-//! evaluated too.
+//! smooth at the price of little more than one evaluation per pixel; where light does change, each sample can be had
+//! by itself. Of a sheet that transmits light the other side is evaluated too.
 
 use glam::{DVec2, DVec3};
 use radiosity_scene::display::{srgb, tone_map};
@@ -32,6 +32,8 @@ pub struct Seen {
     pub response: Bands,
     /// Whether it lies behind a sheet that is seen: on its other side, whose light comes through.
     pub behind: bool,
+    /// Whether its surface emits light there.
+    pub glows: bool,
 }
 
 /// All that a camera sees.
@@ -41,10 +43,14 @@ pub struct ViewRays {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
+    /// Samples along each side of a pixel.
+    pub grid: u32,
     /// Points to evaluate, by pixel.
     pub seen: Vec<Seen>,
     /// Luminance that needs no evaluation: emission and sky, cd/m² per band and pixel.
     pub own: Vec<Bands>,
+    /// Pixels of which a part alone shows any of that, in order, and which part.
+    pub mixed: Vec<(u32, f32)>,
 }
 
 impl ViewRays {
@@ -55,101 +61,138 @@ impl ViewRays {
 
     /// The same with so many samples along each side of a pixel.
     pub fn sampled(tracer: &Tracer, camera: &Camera, (width, height): (u32, u32), grid: u32) -> ViewRays {
-        let rows: Vec<(Vec<Seen>, Vec<Bands>)> = (0..height)
+        let nothing = || ViewRays { width, height, grid, seen: Vec::new(), own: Vec::new(), mixed: Vec::new() };
+        let frame = nothing();
+        let rows: Vec<ViewRays> = (0..height)
             .into_par_iter()
             .map(|row| {
-                let (mut seen, mut own) = (Vec::new(), Vec::new());
-                for column in 0..width {
-                    own.push(cast_pixel(tracer, camera, (width, height), (column, row, grid), &mut seen));
+                let mut of_row = nothing();
+                for pixel in row * width..(row + 1) * width {
+                    let first = of_row.seen.len();
+                    let seen = &mut of_row.seen;
+                    let (own, share) = frame.cast(tracer, camera, pixel, |sample| add(tracer, seen, first, sample));
+                    of_row.own.push(own);
+                    if share > 0.0 && share < 1.0 {
+                        of_row.mixed.push((pixel, share));
+                    }
                 }
-                (seen, own)
+                of_row
             })
             .collect();
-        let mut view = ViewRays { width, height, seen: Vec::new(), own: Vec::new() };
-        for (seen, own) in rows {
-            view.seen.extend(seen);
-            view.own.extend(own);
+        let mut view = nothing();
+        for row in rows {
+            view.seen.extend(row.seen);
+            view.own.extend(row.own);
+            view.mixed.extend(row.mixed);
         }
         view
+    }
+
+    /// The samples that share what is evaluated at some `places` of [`ViewRays::seen`], given by number and in order: where light changes
+    /// within a pixel. With each comes which of the places it is of, and those of a place follow each other.
+    pub fn samples(&self, tracer: &Tracer, camera: &Camera, places: &[u32]) -> Vec<(u32, Seen)> {
+        let of = |place: &u32| {
+            let place = *place as usize;
+            let pixel = self.seen[place].pixel;
+            let first = self.seen[..place].iter().rposition(|seen| seen.pixel != pixel).map_or(0, |before| before + 1);
+            let mut samples = Vec::new();
+            self.cast(tracer, camera, pixel, |sample| {
+                let shared = self.seen[first..].iter().position(|seen| is_shared(tracer, seen, &sample));
+                if shared.is_some_and(|at| first + at == place) {
+                    samples.push((place as u32, sample));
+                }
+            });
+            samples
+        };
+        places.par_iter().flat_map_iter(of).collect()
     }
 
     /// The picture for irradiances (lux per band) of `seen`, in order.
     pub fn picture(&self, irradiance: &[Bands]) -> Picture {
         assert_eq!(irradiance.len(), self.seen.len());
         let mut pixels = self.own.clone();
-        for (seen, e) in self.seen.iter().zip(irradiance) {
-            let pixel = &mut pixels[seen.pixel as usize];
-            for band in 0..3 {
-                pixel[band] += seen.response[band] * e[band];
-            }
-        }
         let mut surfaces = vec![false; pixels.len()];
-        self.seen.iter().for_each(|seen| surfaces[seen.pixel as usize] = true);
-        Picture { width: self.width, height: self.height, pixels, surfaces }
-    }
-}
-
-fn cast_pixel(
-    tracer: &Tracer,
-    camera: &Camera,
-    (width, height): (u32, u32),
-    (column, row, grid): (u32, u32, u32),
-    seen: &mut Vec<Seen>,
-) -> Bands {
-    let aspect = f64::from(width) / f64::from(height);
-    let share = 1.0 / (grid * grid) as f32;
-    let first = seen.len();
-    let pixel = row * width + column;
-    let mut own = [0f32; 3];
-    for sample in 0..grid * grid {
-        let x = (f64::from(column) + (f64::from(sample % grid) + 0.5) / f64::from(grid)) / f64::from(width);
-        let y = (f64::from(row) + (f64::from(sample / grid) + 0.5) / f64::from(grid)) / f64::from(height);
-        let (origin, direction) = camera.ray(2.0 * x - 1.0, 1.0 - 2.0 * y, aspect);
-        let scene = tracer.scene;
-        match tracer.seen(&tracer.free_ray(origin, direction), pixel * grid * grid + sample) {
-            Found::Back => {}
-            Found::Escaped => {
-                let sky = scene.sky.luminance(direction, scene.up.direction());
-                for band in 0..3 {
-                    own[band] += share * sky[band];
-                }
+        let mut glows: Vec<Glow> = self
+            .mixed
+            .iter()
+            .map(|&(pixel, share)| Glow { pixel, share, luminance: self.own[pixel as usize] })
+            .collect();
+        let mut next = 0;
+        for (seen, e) in self.seen.iter().zip(irradiance) {
+            let reflected: Bands = std::array::from_fn(|band| seen.response[band] * e[band]);
+            let add = |sum: &mut Bands| (0..3).for_each(|band| sum[band] += reflected[band]);
+            add(&mut pixels[seen.pixel as usize]);
+            surfaces[seen.pixel as usize] = true;
+            while glows.get(next).is_some_and(|glow| glow.pixel < seen.pixel) {
+                next += 1;
             }
-            Found::Surface { triangle, uv, side, .. } => {
-                let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
-                let at = tracer.mesh.surface(triangle as usize, uv);
-                let emitted = scene.emitted_luminance(at);
-                for band in 0..3 {
-                    own[band] += share * emitted[band];
+            if let Some(glow) = glows.get_mut(next).filter(|glow| seen.glows && glow.pixel == seen.pixel) {
+                add(&mut glow.luminance);
+            }
+        }
+        Picture { width: self.width, height: self.height, pixels, surfaces, glows }
+    }
+
+    /// Casts the samples of a pixel. Answers the luminance that needs no evaluation, cd/m², and which part of the samples shows any.
+    fn cast(&self, tracer: &Tracer, camera: &Camera, pixel: u32, mut surface: impl FnMut(Seen)) -> (Bands, f32) {
+        let ViewRays { width, height, grid, .. } = *self;
+        let (column, row) = (pixel % width, pixel / width);
+        let aspect = f64::from(width) / f64::from(height);
+        let share = 1.0 / (grid * grid) as f32;
+        let (mut own, mut part) = ([0f32; 3], 0.0);
+        let mut shine = |luminance: Bands| {
+            (0..3).for_each(|band| own[band] += share * luminance[band]);
+            let shines = luminance.iter().any(|l| *l > 0.0);
+            part += if shines { share } else { 0.0 };
+            shines
+        };
+        for sample in 0..grid * grid {
+            let x = (f64::from(column) + (f64::from(sample % grid) + 0.5) / f64::from(grid)) / f64::from(width);
+            let y = (f64::from(row) + (f64::from(sample / grid) + 0.5) / f64::from(grid)) / f64::from(height);
+            let (origin, direction) = camera.ray(2.0 * x - 1.0, 1.0 - 2.0 * y, aspect);
+            let scene = tracer.scene;
+            match tracer.seen(&tracer.free_ray(origin, direction), pixel * grid * grid + sample) {
+                Found::Back => {}
+                Found::Escaped => {
+                    shine(scene.sky.luminance(direction, scene.up.direction()));
                 }
-                let point = tracer.mesh.point(triangle as usize, uv);
-                let sample = |side: Side, given_back: Bands, behind: bool| {
-                    let normal = shading_normal(tracer, triangle as usize, uv, side);
-                    let response = given_back.map(|given| given * share / std::f32::consts::PI);
-                    Seen { pixel, place: Place { point, normal, triangle }, uv, side, response, behind }
-                };
-                add(tracer, seen, first, sample(side, scene.reflectance(at), false));
-                let transmittance = scene.transmittance(at);
-                if transmittance.iter().any(|t| *t > 0.0) {
-                    add(tracer, seen, first, sample(side.other(), transmittance, true));
+                Found::Surface { triangle, uv, side, .. } => {
+                    let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
+                    let at = tracer.mesh.surface(triangle as usize, uv);
+                    let glows = shine(scene.emitted_luminance(at));
+                    let point = tracer.mesh.point(triangle as usize, uv);
+                    let sample = |side: Side, given_back: Bands, behind: bool| {
+                        let normal = shading_normal(tracer, triangle as usize, uv, side);
+                        let response = given_back.map(|given| given * share / std::f32::consts::PI);
+                        Seen { pixel, place: Place { point, normal, triangle }, uv, side, response, behind, glows }
+                    };
+                    surface(sample(side, scene.reflectance(at), false));
+                    let transmittance = scene.transmittance(at);
+                    if transmittance.iter().any(|t| *t > 0.0) {
+                        surface(sample(side.other(), transmittance, true));
+                    }
                 }
             }
         }
+        (own, part)
     }
-    own
 }
 
 /// Adds a sample to what the pixel, from `first` on, has seen: to one of the same surface and side, if there is one.
 fn add(tracer: &Tracer, seen: &mut Vec<Seen>, first: usize, sample: Seen) {
-    let similar = seen[first..].iter_mut().find(|s| {
-        s.side == sample.side
-            && s.behind == sample.behind
-            && s.place.normal.dot(sample.place.normal) > SAME_SURFACE
-            && continues(tracer, s, sample.place.triangle)
-    });
-    match similar {
+    match seen[first..].iter_mut().find(|seen| is_shared(tracer, seen, &sample)) {
         Some(seen) => (0..3).for_each(|band| seen.response[band] += sample.response[band]),
         None => seen.push(sample),
     }
+}
+
+/// Whether a sample of the same pixel shares what is evaluated for an earlier one.
+fn is_shared(tracer: &Tracer, seen: &Seen, sample: &Seen) -> bool {
+    seen.side == sample.side
+        && seen.behind == sample.behind
+        && seen.glows == sample.glows
+        && seen.place.normal.dot(sample.place.normal) > SAME_SURFACE
+        && continues(tracer, seen, sample.place.triangle)
 }
 
 /// Whether a triangle belongs to the smooth surface that an earlier sample of the pixel lies on.
@@ -179,6 +222,20 @@ pub struct Picture {
     pub pixels: Vec<Bands>,
     /// Whether a pixel shows a surface; sky and void are not metered.
     pub surfaces: Vec<bool>,
+    /// What emits light, or the sky, where it fills a part of a pixel: edges of lamps that are brighter than white are smooth only if each part
+    /// is tone-mapped by itself.
+    pub glows: Vec<Glow>,
+}
+
+/// A part of a pixel that emits light.
+#[derive(Clone, Copy, Debug)]
+pub struct Glow {
+    /// Pixel, row-major from the top left.
+    pub pixel: u32,
+    /// Part of its samples, more than none and less than all.
+    pub share: f32,
+    /// What they add to the pixel's luminance, cd/m² per band.
+    pub luminance: Bands,
 }
 
 impl Picture {
@@ -200,12 +257,21 @@ impl Picture {
     pub fn tone_mapped(&self, exposure: f64) -> Vec<[u8; 3]> {
         let factor = exposure.exp2() as f32;
         let width = self.width.max(1) as usize;
-        self.pixels
+        let mut mapped: Vec<Bands> = self.pixels.par_iter().map(|pixel| tone_map(pixel.map(|l| l * factor))).collect();
+        for Glow { pixel, share, luminance } in &self.glows {
+            let (all, rest) = (self.pixels[*pixel as usize], 1.0 - share);
+            // Of what is left rounding may make less than nothing.
+            let parts = [
+                (*share, luminance.map(|l| l / share)),
+                (rest, std::array::from_fn(|band| ((all[band] - luminance[band]) / rest).max(0.0))),
+            ];
+            let [glow, rest] = parts.map(|(part, luminance)| tone_map(luminance.map(|l| l * factor)).map(|c| part * c));
+            mapped[*pixel as usize] = std::array::from_fn(|band| glow[band] + rest[band]);
+        }
+        mapped
             .par_iter()
             .enumerate()
-            .map(|(i, pixel)| {
-                let exposed = pixel.map(|l| l * factor);
-                let mapped = tone_map(exposed);
+            .map(|(i, mapped)| {
                 // A quarter of a step of ordered dither hides the banding of 8 bits on smooth walls.
                 let dither = (BAYER[i / width % 4][i % width % 4] as f32 + 0.5) / 16.0 - 0.5;
                 mapped.map(|c| (srgb(c) * 255.0 + 0.5 + dither * 0.9).clamp(0.0, 255.0) as u8)
@@ -265,10 +331,69 @@ mod tests {
         // The upper half shows a bright sky, which must not count.
         let pixels = (0..16).map(|i| if i < 8 { [1e5; 3] } else { [300.0; 3] }).collect();
         let surfaces = (0..16).map(|i| i >= 8).collect();
-        let picture = Picture { width: 4, height: 4, pixels, surfaces };
+        let picture = Picture { width: 4, height: 4, pixels, surfaces, glows: Vec::new() };
         let factor = picture.exposure().exp2() * 300.0;
         assert!((factor - 0.24).abs() < 1e-3, "{factor}");
         let mapped = picture.tone_mapped(picture.exposure());
         assert!(mapped[8..].iter().all(|p| (120..=140).contains(&p[0])), "{:?}", mapped[8]);
+    }
+
+    /// Edges of a lamp that is much brighter than white have values between it and what is around it, though its light alone in a part
+    /// of a pixel would make that white; the luminances are the means that they are.
+    #[test]
+    fn edges_of_lamps_are_smooth() {
+        let glowing = Material { base_color: [0.5, 0.5, 0.5, 1.0], emissive: [1e4; 3], ..Material::default() };
+        let grey = Material { base_color: [0.5, 0.5, 0.5, 1.0], ..Material::default() };
+        let mut scene = Scene { materials: vec![glowing, grey], ..Scene::default() };
+        let quad = |x: [f64; 2]| [[x[0], 0., 9.], [x[1], 0., 9.], [x[1], 0., -9.], [x[0], 0., -9.]].map(DVec3::from);
+        // Its edge is neither upright in the picture nor at a border of pixels.
+        scene.add_quad("lamp", 0, quad([-9.0, 0.0]));
+        scene.add_quad("floor", 1, quad([0.0, 9.0]));
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let up = DVec3::new(0.3, 0.0, -1.0);
+        let camera = Camera::look_at("eye", DVec3::new(0.01, 2.0, 0.0), DVec3::new(0.01, 0.0, 0.0), up, 0.6);
+        let view = ViewRays::new(&tracer, &camera, 24, 24);
+        // Of the light that the lamp reflects nothing is taken for the floor's.
+        let picture = view.picture(&vec![[100.0 * std::f32::consts::TAU; 3]; view.seen.len()]);
+        assert_eq!(picture.glows.len(), view.mixed.len());
+        assert!((24..72).contains(&picture.glows.len()), "{}", picture.glows.len());
+        let mapped = picture.tone_mapped((0.24f64 / 100.0).log2());
+        let [floor, lamp] = [mapped[23][0], mapped[23 * 24][0]].map(f64::from);
+        assert!(lamp > floor + 90.0, "{lamp} {floor}");
+        let linear = |c: f64| (c / 255.0).powf(2.2);
+        for glow in &picture.glows {
+            let at = glow.pixel as usize;
+            let all = 1e4 * glow.share + 100.0;
+            assert!((picture.pixels[at][0] / all - 1.0).abs() < 1e-4, "{} {all}", picture.pixels[at][0]);
+            let share = (linear(f64::from(mapped[at][0])) - linear(floor)) / (linear(lamp) - linear(floor));
+            assert!((share - f64::from(glow.share)).abs() < 0.04, "{share} {}", glow.share);
+        }
+    }
+
+    /// The samples of a place give together what the place does.
+    #[test]
+    fn samples_of_a_place_are_those_that_share_it() {
+        let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
+        scene.add_quad("floor", 0, [[-9., 0., 9.], [9., 0., 9.], [9., 0., -9.], [-9., 0., -9.]].map(DVec3::from));
+        scene.add_quad("wall", 0, [[-9., 0., -1.], [9., 0., -1.], [9., 3., -2.], [-9., 3., -2.]].map(DVec3::from));
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let camera = Camera::look_at("eye", DVec3::new(0.3, 1.0, 2.0), DVec3::new(0.0, 0.2, -1.0), DVec3::Y, 1.0);
+        let view = ViewRays::new(&tracer, &camera, 16, 16);
+        let places: Vec<u32> = (0..view.seen.len() as u32).step_by(3).collect();
+        let samples = view.samples(&tracer, &camera, &places);
+        let mut rest = samples.as_slice();
+        for place in places {
+            let of = rest.partition_point(|(of, _)| *of <= place);
+            let (own, others) = rest.split_at(of);
+            let seen = &view.seen[place as usize];
+            let response: f32 = own.iter().map(|(_, sample)| sample.response[0]).sum();
+            assert!((response / seen.response[0] - 1.0).abs() < 1e-5, "{response} {}", seen.response[0]);
+            assert!(own.iter().all(|(of, sample)| *of == place && sample.pixel == seen.pixel));
+            assert_eq!(own[0].1.place.point, seen.place.point);
+            rest = others;
+        }
+        assert!(rest.is_empty());
     }
 }
