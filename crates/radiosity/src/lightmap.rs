@@ -80,7 +80,7 @@ const LEAST_TEXELS: f64 = 0.25;
 const MOST_GROWTH: f64 = 20.0;
 
 /// The same where even so many would not reach the error: a map that stayed as it was at first would be worse than that of who asks for more
-/// error. A furnished office at 2 % comes from 7.3 to 3.8 % so, in twice the time.
+/// error. A furnished office at 2 % comes from 7.3 to 3.8 % so, in three times the time.
 const MOST_IN_VAIN: f64 = 4.0;
 
 /// How many times as many texels as at first are lit in a round at most: it takes as many times as long then.

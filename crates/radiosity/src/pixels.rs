@@ -48,7 +48,7 @@ const NEAREST: f64 = 1e-30;
 const FLAT: f64 = 0.999;
 const ALONG: f64 = 0.045;
 
-/// Places at which light is found, over those at which it is first looked for, about, with some left over: 1.7 in a furnished office.
+/// Places at which light is found, over those at which it is first looked for, about, with some left over.
 const FOLLOWING: f64 = 2.0;
 
 /// What a square of the picture shows of a surface; places by number.
