@@ -7,13 +7,13 @@
 
 use crate::Error;
 use crate::allocation::Lit;
-use crate::pixels::{DARK, lies_on, pixel, seen};
+use crate::pixels::{DARK, around, lies_on, pixel, seen};
 use radiosity_scene::{Bands, Camera, luminance};
 use radiosity_trace::{Place, Tracer};
 use radiosity_view::picture::{Seen, ViewRays};
 use rayon::prelude::*;
 
-/// By how much light differs at an edge, relative to all the light there: with 0.05 penumbrae a dozen pixels wide would count as edges.
+/// By how much light differs at an edge, relative to all the light of a band there: with 0.05 penumbrae a dozen pixels wide would count as edges.
 const CONTRAST: f32 = 0.1;
 
 /// The same where shadow rays leave noise: with 0.3 lines break off where they cross a soft shadow.
@@ -29,7 +29,7 @@ pub(crate) struct Edges<'a> {
     dark: f32,
     /// Number of the first place of each pixel, and of all.
     first: Vec<u32>,
-    /// What places are given, and whether that was found at their samples.
+    /// What places are given, and whether their samples were asked.
     light: Vec<Bands>,
     is_sampled: Vec<bool>,
     /// Whether it has no noise: where it has, what differs need be no edge.
@@ -55,11 +55,8 @@ impl<'a> Edges<'a> {
 
     /// Places that lie beside a place on the same surface.
     fn beside(&self, place: u32) -> impl Iterator<Item = u32> {
-        let [x, y] = pixel(self.view, place);
         let is_inside = move |[x, y]: &[u32; 2]| *x < self.view.width && *y < self.view.height;
-        (0..9u32)
-            .filter(|k| *k != 4)
-            .filter_map(move |k| Some([(x + k % 3).checked_sub(1)?, (y + k / 3).checked_sub(1)?]))
+        around(pixel(self.view, place))
             .filter(is_inside)
             .flat_map(move |[x, y]| {
                 let pixel = (y * self.view.width + x) as usize;
@@ -77,8 +74,10 @@ impl<'a> Edges<'a> {
 
     /// Whether two values of direct light at a place differ by more than some contrast.
     fn departs(&self, place: u32, (one, other): (Bands, Bands), contrast: f32) -> bool {
-        let all = luminance(self.indirect[place as usize]) + luminance(one).max(luminance(other));
-        (0..3).any(|band| (one[band] - other[band]).abs() > contrast * all.max(self.dark))
+        let indirect = self.indirect[place as usize];
+        let all: Bands = std::array::from_fn(|band| indirect[band] + one[band].max(other[band]));
+        let least = luminance(all).max(self.dark);
+        (0..3).any(|band| (one[band] - other[band]).abs() > contrast * all[band].max(least))
     }
 
     /// Finds light at all samples of some places, given in order, by `light_of`; answers those beside them that are to be looked at next.
@@ -91,6 +90,7 @@ impl<'a> Edges<'a> {
         places: &[u32],
         light_of: impl Fn(&[Place]) -> Result<Lit, Error>,
     ) -> Result<Vec<u32>, Error> {
+        places.iter().for_each(|place| self.is_sampled[*place as usize] = true);
         for some in places.chunks(PORTION) {
             let (of, samples): (Vec<u32>, Vec<Seen>) = self.view.samples(tracer, camera, some).into_iter().unzip();
             let lit = light_of(&samples.iter().map(|seen| seen.place).collect::<Vec<_>>())?;
@@ -105,7 +105,6 @@ impl<'a> Edges<'a> {
                 if is_exact || self.departs(place, (self.light[at], mean), CONTRAST) {
                     (self.light[at], self.is_exact[at]) = (mean, is_exact);
                 }
-                self.is_sampled[at] = true;
             }
         }
         let sharp_beside = |place: &u32| {
@@ -119,7 +118,7 @@ impl<'a> Edges<'a> {
     }
 
     /// How many samples some places have at the most.
-    pub fn samples(&self, places: &[u32]) -> f64 {
+    pub fn most_samples(&self, places: &[u32]) -> f64 {
         places.len() as f64 * f64::from(self.view.grid.pow(2))
     }
 
@@ -160,20 +159,25 @@ mod tests {
         work(&tracer, &camera, &ViewRays::new(&tracer, &camera, SIZE, SIZE));
     }
 
-    /// Softened light of a floor that has `light` at its places.
-    fn softened(tracer: &Tracer, camera: &Camera, view: &ViewRays, light: impl Fn(DVec3) -> f32 + Sync) -> Vec<f32> {
+    /// Softened light of a floor that has `light` at its places, with or without noise; and how many of them were sampled.
+    fn softened(
+        (tracer, camera, view): (&Tracer, &Camera, &ViewRays),
+        is_exact: bool,
+        light: impl Fn(DVec3) -> Bands + Sync,
+    ) -> (Vec<Bands>, usize) {
         let of = |places: &[Place]| Lit {
-            light: places.iter().map(|place| [light(place.point); 3]).collect(),
-            is_exact: vec![true; places.len()],
+            light: places.iter().map(|place| light(place.point)).collect(),
+            is_exact: vec![is_exact; places.len()],
         };
         let single = of(&view.seen.iter().map(|seen| seen.place).collect::<Vec<_>>());
         let indirect = vec![[0.0; 3]; view.seen.len()];
         let mut edges = Edges::new(view, &indirect, single);
-        let mut sharp = edges.sharp();
+        let (mut sharp, mut count) = (edges.sharp(), 0);
         while !sharp.is_empty() {
+            count += sharp.len();
             sharp = edges.sample((tracer, camera), &sharp, |places| Ok(of(places))).unwrap();
         }
-        edges.light().into_iter().map(|[e, ..]| e).collect()
+        (edges.light(), count)
     }
 
     /// Pixels at the edge of a shadow have the mean of their samples, those off it their own light.
@@ -183,14 +187,14 @@ mod tests {
         let from = |at: DVec3| normal.dot(at) - 31.3;
         seen_from_above(|tracer, camera, view| {
             assert_eq!(view.seen.len(), (SIZE * SIZE) as usize);
-            let lit = softened(tracer, camera, view, |at| if from(at) < 0.0 { 100.0 } else { 20.0 });
+            let (lit, _) = softened((tracer, camera, view), true, |at| [if from(at) < 0.0 { 100.0 } else { 20.0 }; 3]);
             let mut between = 0;
-            for (seen, e) in view.seen.iter().zip(&lit) {
+            for (seen, [e, ..]) in view.seen.iter().zip(&lit) {
                 // Its place is its first sample.
                 let distance = from(seen.place.point + DVec3::new(0.375, -0.375, 0.0));
                 let expected = if distance < 0.0 { 100.0 } else { 20.0 };
                 assert!(distance.abs() < 0.8 || (e - expected).abs() < 1e-3, "{distance} {e}");
-                // Of sixteen samples of a square of one unit, the part on the lit side, to within two of them.
+                // Of sixteen samples of a square of one unit, the part on the lit side, to within three of them.
                 let part = (0.5 - distance / (normal.x + normal.y)).clamp(0.0, 1.0);
                 assert!((f64::from(*e) - (20.0 + 80.0 * part)).abs() < 80.0 * 0.2, "{distance} {e}");
                 between += usize::from((25.0..95.0).contains(e));
@@ -205,11 +209,11 @@ mod tests {
         let turn = DMat3::from_rotation_z(0.13);
         let is_dark = |at: DVec3| ((turn * at).x - 26.2).abs() < 0.17;
         seen_from_above(|tracer, camera, view| {
-            let lit = softened(tracer, camera, view, |at| if is_dark(at) { 0.0 } else { 100.0 });
+            let (lit, _) = softened((tracer, camera, view), true, |at| [if is_dark(at) { 0.0 } else { 100.0 }; 3]);
             let mut before = 0;
             for row in 0..SIZE as usize {
                 let of_row = row * SIZE as usize..(row + 1) * SIZE as usize;
-                let missing: f32 = lit[of_row.clone()].iter().map(|e| 100.0 - e).sum();
+                let missing: f32 = lit[of_row.clone()].iter().map(|[e, ..]| 100.0 - e).sum();
                 // Its width across a row, 0.34 / cos 0.13, to within what four rows of samples tell.
                 assert!((15.0..55.0).contains(&missing), "{row}: {missing}");
                 before += usize::from(view.seen[of_row].iter().any(|seen| is_dark(seen.place.point)));
@@ -219,12 +223,41 @@ mod tests {
         });
     }
 
+    /// Light that changes by a few percent from pixel to pixel is no edge, in whichever colour; nor are twice as many where there is noise.
     #[test]
     fn smooth_light_stays_as_it_is() {
+        let slope = |at: DVec3| 50.0 + 3.0 * at.x as f32 + 0.3 * at.y as f32;
         seen_from_above(|tracer, camera, view| {
-            let light = |at: DVec3| 50.0 + at.x as f32 + 0.3 * at.y as f32;
-            let lit = softened(tracer, camera, view, light);
-            assert!(view.seen.iter().zip(lit).all(|(seen, e)| e == light(seen.place.point)));
+            for color in [[1.0; 3], [0.0, 0.0, 1.0], [1.0, 0.3, 0.0]] {
+                let light = |at: DVec3| color.map(|c| c * slope(at));
+                let (lit, count) = softened((tracer, camera, view), true, light);
+                assert!(view.seen.iter().zip(lit).all(|(seen, e)| e == light(seen.place.point)));
+                assert_eq!(count, 0);
+            }
+            let grainy = |at: DVec3| [if (at.x as u32 + at.y as u32).is_multiple_of(2) { 100.0 } else { 85.0 }; 3];
+            assert_eq!(softened((tracer, camera, view), false, grainy).1, 0);
+            assert!(softened((tracer, camera, view), true, grainy).1 > 4000);
+        });
+    }
+
+    /// Where there is noise, samples count only if they depart much from what was found with more rays.
+    #[test]
+    fn samples_with_noise_count_at_edges_alone() {
+        seen_from_above(|tracer, camera, view| {
+            let places = view.seen.len();
+            let beside = |seen: &Seen| seen.place.point.x > 32.0;
+            let light = view.seen.iter().map(|seen| [if beside(seen) { 20.0 } else { 100.0 }; 3]).collect();
+            let indirect = vec![[0.0; 3]; places];
+            for (found, expected) in [(95.0, 100.0), (60.0, 60.0)] {
+                let mut edges =
+                    Edges::new(view, &indirect, Lit { is_exact: vec![false; places], light: Vec::clone(&light) });
+                let sharp: Vec<u32> =
+                    edges.sharp().into_iter().filter(|&place| !beside(&view.seen[place as usize])).collect();
+                assert_eq!(sharp.len(), SIZE as usize);
+                let of = |places: &[Place]| Ok(Lit::sampled(vec![[found; 3]; places.len()]));
+                edges.sample((tracer, camera), &sharp, of).unwrap();
+                assert!(sharp.iter().all(|&place| (edges.light[place as usize][0] - expected).abs() < 1e-3));
+            }
         });
     }
 }

@@ -72,8 +72,8 @@ struct Light<'a> {
     dark: f32,
     /// Where light was found, and by what part of all it may be off a plane.
     found: Vec<Option<(Bands, f32)>>,
-    /// What planes tell.
-    told: Vec<Option<Bands>>,
+    /// What planes tell, and whether one did: where time was over, it lies between what was found.
+    told: Vec<Option<(Bands, bool)>>,
 }
 
 /// A plane of light over a surface.
@@ -109,8 +109,9 @@ impl<'a> Tiles<'a> {
         (FOLLOWING * first / self.view.seen.len().max(1) as f64).min(1.0)
     }
 
-    /// Direct light of all places, beside which there is `indirect` light, and whether it has no noise that a plane has not evened out. `light_of` finds it at some of them, and says with how many
-    /// shadow rays; or nothing where there is no time for it, and it is told by what is around.
+    /// Direct light of all places, beside which there is `indirect` light, and whether its noise is gone: it is exact, or a plane evened it
+    /// out. `light_of` finds it at some of them, and says with how many shadow rays; or nothing where there is no time for it, and it is told
+    /// by what is around.
     ///
     /// # Errors
     /// Those of `light_of`.
@@ -139,7 +140,7 @@ impl<'a> Tiles<'a> {
             let mut rough: Vec<usize> = quartered.iter().map(|tile| tile.whole).collect();
             rough.dedup();
             for tile in rough.into_iter().map(|whole| &wholes[whole]) {
-                for &whole in tile.around().filter_map(|square| at.get(&square)).flatten() {
+                for &whole in around(tile.square).filter_map(|square| at.get(&square)).flatten() {
                     let beside = &wholes[whole];
                     if !is_quartered[whole] && tile.lies_on(view, beside) {
                         is_quartered[whole] = true;
@@ -219,17 +220,14 @@ pub(crate) fn lies_on(a: &Seen, b: &Seen) -> bool {
     a.behind == b.behind && a.place.normal.dot(b.place.normal) > FLAT && off <= ALONG * between.length()
 }
 
+/// Squares, or pixels, around one; those past the right and lower border, too.
+pub(crate) fn around([x, y]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
+    (0..9u32).filter(|k| *k != 4).filter_map(move |k| Some([(x + k % 3).checked_sub(1)?, (y + k / 3).checked_sub(1)?]))
+}
+
 impl Tile {
     fn lies_on(&self, view: &ViewRays, other: &Tile) -> bool {
         lies_on(seen(view, self.places[0]), seen(view, other.places[0]))
-    }
-
-    /// Squares around it.
-    fn around(&self) -> impl Iterator<Item = [u32; 2]> {
-        let [x, y] = self.square;
-        (0..9u32)
-            .filter(|k| *k != 4)
-            .filter_map(move |k| Some([(x + k % 3).checked_sub(1)?, (y + k / 3).checked_sub(1)?]))
     }
 
     fn quarters(&self, view: &ViewRays) -> Vec<Tile> {
@@ -299,7 +297,8 @@ impl<'a> Light<'a> {
             match plane {
                 Some(plane) => {
                     for &place in &tile.places {
-                        self.told[place as usize] = Some(plane.at(seen(self.view, place)).map(|e| e.max(0.0)));
+                        let light = plane.at(seen(self.view, place)).map(|e| e.max(0.0));
+                        self.told[place as usize] = Some((light, true));
                     }
                     continue;
                 }
@@ -350,17 +349,17 @@ impl<'a> Light<'a> {
             unknown.iter().map(of).collect()
         };
         for (place, light) in unknown.into_iter().zip(lit) {
-            self.told[place as usize] = Some(light);
+            self.told[place as usize] = Some((light, false));
         }
     }
 
     /// Light of all places: what is exact, or else what planes tell, which have less noise than what was found.
     fn all(self) -> Lit {
-        let of = |(found, told): (Option<(Bands, f32)>, Option<Bands>)| match (found, told) {
+        let of = |place: usize| match (self.found[place], self.told[place]) {
             (Some((light, off)), told) if off <= SMOOTH || told.is_none() => (light, off <= SMOOTH),
-            (_, told) => (told.unwrap_or([0.0; 3]), true),
+            (_, told) => told.unwrap_or(([0.0; 3], false)),
         };
-        let (light, is_exact) = self.found.into_iter().zip(self.told).map(of).unzip();
+        let (light, is_exact) = (0..self.found.len()).map(of).unzip();
         Lit { light, is_exact }
     }
 }
@@ -418,7 +417,7 @@ mod tests {
         };
         let n = SIZE * SIZE;
         let (seen, own) = ((0..n).map(place).collect(), vec![[0.0; 3]; n as usize]);
-        ViewRays { width: SIZE, height: SIZE, grid: 1, seen, own, mixed: Vec::new() }
+        ViewRays { width: SIZE, height: SIZE, grid: 1, seen, own, partly_own: Vec::new() }
     }
 
     /// The light that is told where `light` is what each pixel has, whether exactly, and of how many pixels it was asked.

@@ -47,11 +47,9 @@ const SMALLER: u32 = 16;
 /// Shadow rays that a part of the pixels is timed with: enough to tell what each takes.
 const TIMED_SHADOW_RAYS: u32 = 64;
 
-/// Shadow rays of each sample of a pixel at the edge of a shadow: sixteen have together what a place has.
-const RAYS_OF_A_SAMPLE: u32 = 16;
-
-/// What edges of shadows take of what direct light of all places would: so it is in a furnished office.
-const EDGES: f64 = 0.06;
+/// What edges of shadows take of what direct light of all places would: so it is in a furnished office. With less there would be no time left
+/// for them, with more places would have fewer rays.
+const SOFTENED: f64 = 0.06;
 
 /// Part of the time that cells that are seen may gather in, where it does not do for all: shadows and what is reflected are seen alike.
 const GATHERED: f64 = 0.5;
@@ -70,7 +68,8 @@ pub struct View {
     pub illuminance: Vec<f32>,
     /// Places that are seen, spread over the pixels, and their irradiance there.
     pub watched: Vec<(Place, Bands)>,
-    /// Whether a deadline left fewer shadow rays than were asked for, or places without any, which lie between those around them.
+    /// Whether a deadline left fewer shadow rays than were asked for, places without any, which lie between those around them, or edges of
+    /// shadows that are as those of single places.
     pub is_hurried: bool,
 }
 
@@ -113,7 +112,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         None => solution.field_on(&looks, light, baked.error, monitor)?,
         Some(seconds) => {
             let lit = cost(solution, &stations, &options.shadowing, monitor)?;
-            let lit = (tiles.part() + EDGES) * lit.seconds(f64::from(options.shadowing.rays));
+            let lit = (tiles.part() + SOFTENED) * lit.seconds(f64::from(options.shadowing.rays));
             // Timing took some of it.
             let seconds = left().unwrap_or(seconds);
             let gather = (seconds - lit).max(GATHERED * seconds);
@@ -129,7 +128,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     let direct = tiles.direct(&indirect, |own| {
         if let (Some(cost), Some(seconds)) = (&cost, left()) {
             // All that follows is planned with the first ones.
-            let part = if is_first { tiles.part() + EDGES } else { own.len() as f64 / stations.len() as f64 };
+            let part = if is_first { tiles.part() + SOFTENED } else { own.len() as f64 / stations.len() as f64 };
             let (cost, least) = (cost.of(part), LEAST_SHADOW_RAYS.min(shadowing.rays));
             if !is_first && !pace::suffices(seconds, cost.seconds(f64::from(least))) {
                 is_hurried = true;
@@ -142,9 +141,16 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         Ok(Some((solution.direct_by(&places, &shadowing, 0, monitor)?, shadowing.rays)))
     })?;
     let both = |(h, d): (&Bands, &Bands)| -> Bands { std::array::from_fn(|band| h[band] + d[band]) };
-    let of_places: Vec<Bands> = indirect.iter().zip(&direct.light).map(both).collect();
+    // One of each of as many runs of places; at equal steps they might all lie in one column.
+    let count = baked.watched.len().min(stations.len());
+    let pick = |i: usize| {
+        let jitter = f64::from(unit(hash(baked.seed ^ hash(i as u32))));
+        ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
+    };
+    let watched = (0..count).map(pick).map(|i| (stations[i].place, both((&indirect[i], &direct.light[i])))).collect();
     let edges = Edges::new(&view, &indirect, direct);
-    let of_sample = Shadowing { rays: RAYS_OF_A_SAMPLE.min(shadowing.rays), ..shadowing };
+    // Those of a place share its rays.
+    let of_sample = Shadowing { rays: shadowing.rays.div_ceil(view.grid.pow(2)), ..shadowing };
     let has_time = |samples: f64| {
         let cost = cost.as_ref().map(|cost| cost.of(samples / stations.len() as f64));
         let suffices = |(cost, left): (Cost, f64)| pace::suffices(left, cost.seconds(f64::from(of_sample.rays)));
@@ -160,18 +166,11 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
             (share[pixel], illuminance[pixel]) = (response, luminance(*e));
         }
     }
-    // One of each of as many runs of places; at equal steps they might all lie in one column.
-    let count = baked.watched.len().min(stations.len());
-    let pick = |i: usize| {
-        let jitter = f64::from(unit(hash(baked.seed ^ hash(i as u32))));
-        ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
-    };
-    let watched = (0..count).map(pick).map(|i| (stations[i].place, of_places[i])).collect();
     is_hurried |= !is_whole || shadowing.rays < options.shadowing.rays;
     Ok(View { picture: view.picture(&irradiance), illuminance, watched, is_hurried })
 }
 
-/// Direct light with its edges within pixels, as far as there is time for so many samples; whether there was for all.
+/// Direct light with its edges within pixels, round by round as far as there is time for so many samples; whether there was for all.
 fn soften(
     mut edges: Edges,
     has_time: impl Fn(f64) -> bool,
@@ -180,7 +179,7 @@ fn soften(
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Bands>, bool), Error> {
     let mut sharp = edges.sharp();
-    while !sharp.is_empty() && has_time(edges.samples(&sharp)) {
+    while !sharp.is_empty() && has_time(edges.most_samples(&sharp)) {
         sharp = edges
             .sample((solution.tracer(), camera), &sharp, |places| solution.direct_by(places, shadowing, 0, monitor))?;
     }

@@ -50,7 +50,15 @@ pub struct ViewRays {
     /// Luminance that needs no evaluation: emission and sky, cd/m² per band and pixel.
     pub own: Vec<Bands>,
     /// Pixels of which a part alone shows any of that, in order, and which part.
-    pub mixed: Vec<(u32, f32)>,
+    pub partly_own: Vec<(u32, f32)>,
+}
+
+/// What is known of a pixel's samples beforehand.
+#[derive(Clone, Copy)]
+struct Frame {
+    width: u32,
+    height: u32,
+    grid: u32,
 }
 
 impl ViewRays {
@@ -61,8 +69,8 @@ impl ViewRays {
 
     /// The same with so many samples along each side of a pixel.
     pub fn sampled(tracer: &Tracer, camera: &Camera, (width, height): (u32, u32), grid: u32) -> ViewRays {
-        let nothing = || ViewRays { width, height, grid, seen: Vec::new(), own: Vec::new(), mixed: Vec::new() };
-        let frame = nothing();
+        let frame = Frame { width, height, grid };
+        let nothing = || ViewRays { width, height, grid, seen: Vec::new(), own: Vec::new(), partly_own: Vec::new() };
         let rows: Vec<ViewRays> = (0..height)
             .into_par_iter()
             .map(|row| {
@@ -73,7 +81,7 @@ impl ViewRays {
                     let (own, share) = frame.cast(tracer, camera, pixel, |sample| add(tracer, seen, first, sample));
                     of_row.own.push(own);
                     if share > 0.0 && share < 1.0 {
-                        of_row.mixed.push((pixel, share));
+                        of_row.partly_own.push((pixel, share));
                     }
                 }
                 of_row
@@ -83,22 +91,25 @@ impl ViewRays {
         for row in rows {
             view.seen.extend(row.seen);
             view.own.extend(row.own);
-            view.mixed.extend(row.mixed);
+            view.partly_own.extend(row.partly_own);
         }
         view
     }
 
     /// The samples that share what is evaluated at some `places` of [`ViewRays::seen`], given by number and in order: where light changes
-    /// within a pixel. With each comes which of the places it is of, and those of a place follow each other.
+    /// within a pixel. With each comes which of the places it is of, and those of a place follow each other. Tracer and camera are those
+    /// that the rays were cast with.
     pub fn samples(&self, tracer: &Tracer, camera: &Camera, places: &[u32]) -> Vec<(u32, Seen)> {
+        let frame = Frame { width: self.width, height: self.height, grid: self.grid };
         let of = |place: &u32| {
             let place = *place as usize;
             let pixel = self.seen[place].pixel;
             let first = self.seen[..place].iter().rposition(|seen| seen.pixel != pixel).map_or(0, |before| before + 1);
+            // What a sample shares is the first that it can: nothing after the place need be looked at.
+            let own = &self.seen[first..=place];
             let mut samples = Vec::new();
-            self.cast(tracer, camera, pixel, |sample| {
-                let shared = self.seen[first..].iter().position(|seen| is_shared(tracer, seen, &sample));
-                if shared.is_some_and(|at| first + at == place) {
+            frame.cast(tracer, camera, pixel, |sample| {
+                if own.iter().position(|seen| is_shared(tracer, seen, &sample)) == Some(place - first) {
                     samples.push((place as u32, sample));
                 }
             });
@@ -112,11 +123,9 @@ impl ViewRays {
         assert_eq!(irradiance.len(), self.seen.len());
         let mut pixels = self.own.clone();
         let mut surfaces = vec![false; pixels.len()];
-        let mut glows: Vec<Glow> = self
-            .mixed
-            .iter()
-            .map(|&(pixel, share)| Glow { pixel, share, luminance: self.own[pixel as usize] })
-            .collect();
+        let glow =
+            |&(pixel, share): &(u32, f32)| Glow { pixel, share, luminance: self.own[pixel as usize], rest: [0.0; 3] };
+        let mut glows: Vec<Glow> = self.partly_own.iter().map(glow).collect();
         let mut next = 0;
         for (seen, e) in self.seen.iter().zip(irradiance) {
             let reflected: Bands = std::array::from_fn(|band| seen.response[band] * e[band]);
@@ -126,16 +135,18 @@ impl ViewRays {
             while glows.get(next).is_some_and(|glow| glow.pixel < seen.pixel) {
                 next += 1;
             }
-            if let Some(glow) = glows.get_mut(next).filter(|glow| seen.glows && glow.pixel == seen.pixel) {
-                add(&mut glow.luminance);
+            if let Some(glow) = glows.get_mut(next).filter(|glow| glow.pixel == seen.pixel) {
+                add(if seen.glows { &mut glow.luminance } else { &mut glow.rest });
             }
         }
         Picture { width: self.width, height: self.height, pixels, surfaces, glows }
     }
+}
 
+impl Frame {
     /// Casts the samples of a pixel. Answers the luminance that needs no evaluation, cd/m², and which part of the samples shows any.
     fn cast(&self, tracer: &Tracer, camera: &Camera, pixel: u32, mut surface: impl FnMut(Seen)) -> (Bands, f32) {
-        let ViewRays { width, height, grid, .. } = *self;
+        let Frame { width, height, grid } = *self;
         let (column, row) = (pixel % width, pixel / width);
         let aspect = f64::from(width) / f64::from(height);
         let share = 1.0 / (grid * grid) as f32;
@@ -222,8 +233,8 @@ pub struct Picture {
     pub pixels: Vec<Bands>,
     /// Whether a pixel shows a surface; sky and void are not metered.
     pub surfaces: Vec<bool>,
-    /// What emits light, or the sky, where it fills a part of a pixel: edges of lamps that are brighter than white are smooth only if each part
-    /// is tone-mapped by itself.
+    /// What emits light, or the sky, where it fills a part of a pixel, in order: edges of lamps that are brighter than white are smooth only
+    /// if each part is tone-mapped by itself. Lamps before what emits light too, however little, are not told from it.
     pub glows: Vec<Glow>,
 }
 
@@ -236,6 +247,8 @@ pub struct Glow {
     pub share: f32,
     /// What they add to the pixel's luminance, cd/m² per band.
     pub luminance: Bands,
+    /// What all others add.
+    pub rest: Bands,
 }
 
 impl Picture {
@@ -257,24 +270,23 @@ impl Picture {
     pub fn tone_mapped(&self, exposure: f64) -> Vec<[u8; 3]> {
         let factor = exposure.exp2() as f32;
         let width = self.width.max(1) as usize;
-        let mut mapped: Vec<Bands> = self.pixels.par_iter().map(|pixel| tone_map(pixel.map(|l| l * factor))).collect();
-        for Glow { pixel, share, luminance } in &self.glows {
-            let (all, rest) = (self.pixels[*pixel as usize], 1.0 - share);
-            // Of what is left rounding may make less than nothing.
-            let parts = [
-                (*share, luminance.map(|l| l / share)),
-                (rest, std::array::from_fn(|band| ((all[band] - luminance[band]) / rest).max(0.0))),
-            ];
-            let [glow, rest] = parts.map(|(part, luminance)| tone_map(luminance.map(|l| l * factor)).map(|c| part * c));
-            mapped[*pixel as usize] = std::array::from_fn(|band| glow[band] + rest[band]);
-        }
-        mapped
+        let map = |luminance: Bands| tone_map(luminance.map(|l| l * factor));
+        let mapped = |(i, pixel): (usize, &Bands)| match self.glows.binary_search_by_key(&(i as u32), |glow| glow.pixel)
+        {
+            Err(_) => map(*pixel),
+            Ok(at) => {
+                let Glow { share, luminance, rest, .. } = self.glows[at];
+                let (glow, others) = (map(luminance.map(|l| l / share)), map(rest.map(|l| l / (1.0 - share))));
+                std::array::from_fn(|band| share * glow[band] + (1.0 - share) * others[band])
+            }
+        };
+        self.pixels
             .par_iter()
             .enumerate()
-            .map(|(i, mapped)| {
+            .map(|(i, pixel)| {
                 // A quarter of a step of ordered dither hides the banding of 8 bits on smooth walls.
                 let dither = (BAYER[i / width % 4][i % width % 4] as f32 + 0.5) / 16.0 - 0.5;
-                mapped.map(|c| (srgb(c) * 255.0 + 0.5 + dither * 0.9).clamp(0.0, 255.0) as u8)
+                mapped((i, pixel)).map(|c| (srgb(c) * 255.0 + 0.5 + dither * 0.9).clamp(0.0, 255.0) as u8)
             })
             .collect()
     }
@@ -356,7 +368,6 @@ mod tests {
         let view = ViewRays::new(&tracer, &camera, 24, 24);
         // Of the light that the lamp reflects nothing is taken for the floor's.
         let picture = view.picture(&vec![[100.0 * std::f32::consts::TAU; 3]; view.seen.len()]);
-        assert_eq!(picture.glows.len(), view.mixed.len());
         assert!((24..72).contains(&picture.glows.len()), "{}", picture.glows.len());
         let mapped = picture.tone_mapped((0.24f64 / 100.0).log2());
         let [floor, lamp] = [mapped[23][0], mapped[23 * 24][0]].map(f64::from);

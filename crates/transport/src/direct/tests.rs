@@ -130,6 +130,41 @@ fn penumbrae_are_unbiased() {
     }
 }
 
+/// To a light without area there is one line of sight, which a ray tells exactly, behind a blocker and beside it; unless something
+/// lets a part of the light pass, or there are fewer rays than lights.
+#[test]
+fn lights_without_area_are_exact() {
+    use radiosity_scene::{AlphaMode, PointLight, PointLightKind};
+    let light = |kind: PointLightKind, x: f64| PointLight {
+        name: String::new(),
+        kind,
+        position: DVec3::new(x, 0.0, 2.0),
+        direction: -DVec3::Z,
+        intensity: [100.0; 3],
+        range: None,
+    };
+    let mut scene = lamps(0, false);
+    let corners = [[0.1, -1.0, 1.0], [2.1, -1.0, 1.0], [2.1, 1.0, 1.0], [0.1, 1.0, 1.0]].map(DVec3::from);
+    scene.add_quad("blocker", 1, corners);
+    scene.lights = vec![light(PointLightKind::Point, 0.0), light(PointLightKind::Directional, 0.0)];
+    let places: Vec<Place> = (0..40).map(|i| on_the_floor(0.0213 * f64::from(i) - 0.3, 0.1)).collect();
+    let found = columns(&scene, &places, 4);
+    for (i, place) in places.iter().enumerate() {
+        // Past twice the blocker's edge the point is hidden, past the edge itself the sun.
+        let x = place.point.x;
+        let square = x * x + 0.01 + 4.0;
+        let of_point = if x < 0.2 { 100.0 * 2.0 / square.powf(1.5) } else { 0.0 };
+        let truth = of_point + if x < 0.1 { 100.0 } else { 0.0 };
+        assert!(found.is_exact(i) && (f64::from(found.mean(i)[1]) - truth).abs() < 1e-5 * 100.0, "{x}");
+    }
+    let few = columns(&scene, &places, 1);
+    assert!((0..places.len()).any(|i| !few.is_exact(i)));
+    scene.materials[1].alpha_mode = AlphaMode::Blend;
+    scene.materials[1].base_color[3] = 0.5;
+    let parted = columns(&scene, &places, 4);
+    assert!(!parted.is_exact(places.len() - 1));
+}
+
 /// Where rays would take longer, what stands before a lamp is cut out of it: no noise is left.
 #[test]
 fn penumbrae_past_few_blockers_are_exact() {
