@@ -91,6 +91,7 @@ impl<'a> Edges<'a> {
         light_of: impl Fn(&[Place]) -> Result<Lit, Error>,
     ) -> Result<Vec<u32>, Error> {
         places.iter().for_each(|place| self.is_sampled[*place as usize] = true);
+        let mut crossed = Vec::new();
         for some in places.chunks(PORTION) {
             let (of, samples): (Vec<u32>, Vec<Seen>) = self.view.samples(tracer, camera, some).into_iter().unzip();
             let lit = light_of(&samples.iter().map(|seen| seen.place).collect::<Vec<_>>())?;
@@ -99,7 +100,11 @@ impl<'a> Edges<'a> {
                 let (place, own) = (of_place[0], begin..begin + of_place.len());
                 begin = own.end;
                 let is_exact = lit.is_exact[own.clone()].iter().all(|is_exact| *is_exact);
-                let mean = mean(&samples[own.clone()], &lit.light[own]);
+                let light = &lit.light[own.clone()];
+                if is_exact && light.iter().any(|sample| self.departs(place, (light[0], *sample), CONTRAST)) {
+                    crossed.push(place);
+                }
+                let mean = mean(&samples[own], light);
                 let at = place as usize;
                 // Few rays at each sample have more noise together than many at one place.
                 if is_exact || self.departs(place, (self.light[at], mean), CONTRAST) {
@@ -107,11 +112,15 @@ impl<'a> Edges<'a> {
                 }
             }
         }
+        // What crosses a pixel goes on, however little of the next one it fills.
+        let is_left = |other: &u32| !self.is_sampled[*other as usize];
+        let beside = |place: &u32| self.beside(*place).filter(is_left).collect::<Vec<u32>>();
         let sharp_beside = |place: &u32| {
-            let is_next = |other: &u32| !self.is_sampled[*other as usize] && self.differs(*place, *other);
+            let is_next = |other: &u32| is_left(other) && self.differs(*place, *other);
             self.beside(*place).filter(is_next).collect::<Vec<u32>>()
         };
-        let mut next: Vec<u32> = places.par_iter().flat_map_iter(sharp_beside).collect();
+        let mut next: Vec<u32> = crossed.par_iter().flat_map_iter(beside).collect();
+        next.par_extend(places.par_iter().flat_map_iter(sharp_beside));
         next.sort_unstable();
         next.dedup();
         Ok(next)
