@@ -23,7 +23,7 @@ pub fn for_page(view: &View) -> View {
     if n == 1 || width == 0 || height == 0 {
         return view.clone();
     }
-    let mut small = Picture { width, height, pixels: Vec::new(), surfaces: Vec::new(), glows: Vec::new() };
+    let mut small = Picture { width, height, pixels: Vec::new(), surfaces: Vec::new(), parts: Vec::new() };
     let mut illuminance = Vec::new();
     for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
         let block = (0..n * n).map(|i| ((y * n + i / n) * picture.width + x * n + i % n) as usize);

@@ -39,7 +39,7 @@ pub(crate) struct Edges<'a> {
 impl<'a> Edges<'a> {
     /// Edges in the direct `light` of single places.
     pub fn new(view: &'a ViewRays, indirect: &'a [Bands], Lit { light, is_exact }: Lit) -> Edges<'a> {
-        let mut first = vec![0; view.own.len() + 1];
+        let mut first = vec![0; view.sky.len() + 1];
         view.seen.iter().for_each(|seen| first[seen.pixel as usize + 1] += 1);
         (1..first.len()).for_each(|pixel| first[pixel] += first[pixel - 1]);
         let sum: f64 = light.iter().chain(indirect).map(|light| f64::from(luminance(*light))).sum();
@@ -200,7 +200,7 @@ mod tests {
             let mut between = 0;
             for (seen, [e, ..]) in view.seen.iter().zip(&lit) {
                 // Its place is its first sample.
-                let distance = from(seen.place.point + DVec3::new(0.375, -0.375, 0.0));
+                let distance = from(seen.place.point + DVec3::new(0.09375, -0.09375, 0.0));
                 let expected = if distance < 0.0 { 100.0 } else { 20.0 };
                 assert!(distance.abs() < 0.8 || (e - expected).abs() < 1e-3, "{distance} {e}");
                 // Of sixteen samples of a square of one unit, the part on the lit side, to within three of them.

@@ -413,11 +413,20 @@ mod tests {
             let [x, y] = [pixel % SIZE, pixel / SIZE];
             let point = DVec3::new(f64::from(x), f64::from(y), if x < step { 0.0 } else { -30.0 });
             let place = Place { point, normal: DVec3::Z, triangle: 0 };
-            Seen { pixel, place, uv: DVec2::ZERO, side: Side::Front, response: [1.0; 3], behind: false, glows: false }
+            Seen {
+                pixel,
+                place,
+                uv: DVec2::ZERO,
+                side: Side::Front,
+                response: [1.0; 3],
+                behind: false,
+                share: 1.0,
+                emitted: [0.0; 3],
+            }
         };
         let n = SIZE * SIZE;
-        let (seen, own) = ((0..n).map(place).collect(), vec![[0.0; 3]; n as usize]);
-        ViewRays { width: SIZE, height: SIZE, grid: 1, seen, own, partly_own: Vec::new() }
+        let (seen, sky) = ((0..n).map(place).collect(), vec![[0.0; 3]; n as usize]);
+        ViewRays { width: SIZE, height: SIZE, grid: 1, seen, sky }
     }
 
     /// The light that is told where `light` is what each pixel has, whether exactly, and of how many pixels it was asked.

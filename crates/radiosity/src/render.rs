@@ -158,7 +158,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     };
     let (softened, is_whole) = soften(edges, has_time, (solution, camera), &of_sample, monitor)?;
     let irradiance: Vec<Bands> = indirect.iter().zip(&softened).map(both).collect();
-    let pixels = view.own.len();
+    let pixels = view.sky.len();
     let (mut illuminance, mut share) = (vec![f32::NAN; pixels], vec![-1f32; pixels]);
     for (seen, e) in view.seen.iter().zip(&irradiance) {
         let (pixel, response) = (seen.pixel as usize, luminance(seen.response));

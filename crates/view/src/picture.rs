@@ -1,6 +1,6 @@
 //! Pictures: which surfaces the pixels of a camera see, exposure, tone mapping.
 //!
-//! A pixel is sampled on a 4 × 4 grid. Samples that see the same smooth surface share one evaluation of irradiance,
+//! A pixel has 16 samples. Samples that see the same smooth surface share one evaluation of irradiance,
 //! because light changes slowly within a pixel where edges do not; reflectance is looked up at each. Edges come out
 //! smooth at the price of little more than one evaluation per pixel; where light does change, each sample can be had
 //! by itself. Of a sheet that transmits light the other side is evaluated too.
@@ -32,8 +32,10 @@ pub struct Seen {
     pub response: Bands,
     /// Whether it lies behind a sheet that is seen: on its other side, whose light comes through.
     pub behind: bool,
-    /// Whether its surface emits light there.
-    pub glows: bool,
+    /// Part of the pixel's samples that it stands for.
+    pub share: f32,
+    /// Luminance that the pixel gains by what the surface emits, cd/m² per band.
+    pub emitted: Bands,
 }
 
 /// All that a camera sees.
@@ -47,10 +49,8 @@ pub struct ViewRays {
     pub grid: u32,
     /// Points to evaluate, by pixel.
     pub seen: Vec<Seen>,
-    /// Luminance that needs no evaluation: emission and sky, cd/m² per band and pixel.
-    pub own: Vec<Bands>,
-    /// Pixels of which a part alone shows any of that, in order, and which part.
-    pub partly_own: Vec<(u32, f32)>,
+    /// Luminance that pixels have from where no surface is seen, cd/m² per band.
+    pub sky: Vec<Bands>,
 }
 
 /// What is known of a pixel's samples beforehand.
@@ -70,7 +70,7 @@ impl ViewRays {
     /// The same with so many samples along each side of a pixel.
     pub fn sampled(tracer: &Tracer, camera: &Camera, (width, height): (u32, u32), grid: u32) -> ViewRays {
         let frame = Frame { width, height, grid };
-        let nothing = || ViewRays { width, height, grid, seen: Vec::new(), own: Vec::new(), partly_own: Vec::new() };
+        let nothing = || ViewRays { width, height, grid, seen: Vec::new(), sky: Vec::new() };
         let rows: Vec<ViewRays> = (0..height)
             .into_par_iter()
             .map(|row| {
@@ -78,11 +78,7 @@ impl ViewRays {
                 for pixel in row * width..(row + 1) * width {
                     let first = of_row.seen.len();
                     let seen = &mut of_row.seen;
-                    let (own, share) = frame.cast(tracer, camera, pixel, |sample| add(tracer, seen, first, sample));
-                    of_row.own.push(own);
-                    if share > 0.0 && share < 1.0 {
-                        of_row.partly_own.push((pixel, share));
-                    }
+                    of_row.sky.push(frame.cast(tracer, camera, pixel, |sample| add(tracer, seen, first, sample)));
                 }
                 of_row
             })
@@ -90,8 +86,7 @@ impl ViewRays {
         let mut view = nothing();
         for row in rows {
             view.seen.extend(row.seen);
-            view.own.extend(row.own);
-            view.partly_own.extend(row.partly_own);
+            view.sky.extend(row.sky);
         }
         view
     }
@@ -121,78 +116,110 @@ impl ViewRays {
     /// The picture for irradiances (lux per band) of `seen`, in order.
     pub fn picture(&self, irradiance: &[Bands]) -> Picture {
         assert_eq!(irradiance.len(), self.seen.len());
-        let mut pixels = self.own.clone();
-        let mut surfaces = vec![false; pixels.len()];
-        let glow =
-            |&(pixel, share): &(u32, f32)| Glow { pixel, share, luminance: self.own[pixel as usize], rest: [0.0; 3] };
-        let mut glows: Vec<Glow> = self.partly_own.iter().map(glow).collect();
-        let mut next = 0;
-        for (seen, e) in self.seen.iter().zip(irradiance) {
-            let reflected: Bands = std::array::from_fn(|band| seen.response[band] * e[band]);
-            let add = |sum: &mut Bands| (0..3).for_each(|band| sum[band] += reflected[band]);
-            add(&mut pixels[seen.pixel as usize]);
-            surfaces[seen.pixel as usize] = true;
-            while glows.get(next).is_some_and(|glow| glow.pixel < seen.pixel) {
-                next += 1;
+        let (mut pixels, mut surfaces) = (self.sky.clone(), vec![false; self.sky.len()]);
+        let mut parts: Vec<Part> = Vec::new();
+        let given: Vec<Bands> = self.seen.iter().zip(irradiance).map(|(seen, e)| seen.gives(*e)).collect();
+        let mut begin = 0;
+        for of_pixel in self.seen.chunk_by(|a, b| a.pixel == b.pixel) {
+            let (pixel, first) = (of_pixel[0].pixel, parts.len());
+            surfaces[pixel as usize] = true;
+            let mut rest = 1.0;
+            for (seen, given) in of_pixel.iter().zip(&given[begin..]) {
+                let add = |sum: &mut Bands| (0..3).for_each(|band| sum[band] += given[band]);
+                add(&mut pixels[pixel as usize]);
+                match parts[first..].last_mut() {
+                    // It lies behind the sheet that was seen before it.
+                    Some(part) if seen.behind => add(&mut part.luminance),
+                    _ => parts.push(Part { pixel, share: seen.share, luminance: *given }),
+                }
+                rest -= if seen.behind { 0.0 } else { seen.share };
             }
-            if let Some(glow) = glows.get_mut(next).filter(|glow| glow.pixel == seen.pixel) {
-                add(if seen.glows { &mut glow.luminance } else { &mut glow.rest });
+            begin += of_pixel.len();
+            // Shares are multiples of that of a sample.
+            if rest > 0.5 / (self.grid * self.grid) as f32 {
+                parts.push(Part { pixel, share: rest, luminance: self.sky[pixel as usize] });
+            }
+            if parts.len() == first + 1 {
+                parts.truncate(first);
             }
         }
-        Picture { width: self.width, height: self.height, pixels, surfaces, glows }
+        Picture { width: self.width, height: self.height, pixels, surfaces, parts }
     }
 }
 
 impl Frame {
-    /// Casts the samples of a pixel. Answers the luminance that needs no evaluation, cd/m², and which part of the samples shows any.
-    fn cast(&self, tracer: &Tracer, camera: &Camera, pixel: u32, mut surface: impl FnMut(Seen)) -> (Bands, f32) {
+    /// Casts the samples of a pixel. Answers the luminance of the sky in it, cd/m².
+    fn cast(&self, tracer: &Tracer, camera: &Camera, pixel: u32, mut surface: impl FnMut(Seen)) -> Bands {
         let Frame { width, height, grid } = *self;
         let (column, row) = (pixel % width, pixel / width);
         let aspect = f64::from(width) / f64::from(height);
         let share = 1.0 / (grid * grid) as f32;
-        let (mut own, mut part) = ([0f32; 3], 0.0);
-        let mut shine = |luminance: Bands| {
-            (0..3).for_each(|band| own[band] += share * luminance[band]);
-            let shines = luminance.iter().any(|l| *l > 0.0);
-            part += if shines { share } else { 0.0 };
-            shines
-        };
+        let mut sky = [0f32; 3];
         for sample in 0..grid * grid {
-            let x = (f64::from(column) + (f64::from(sample % grid) + 0.5) / f64::from(grid)) / f64::from(width);
-            let y = (f64::from(row) + (f64::from(sample / grid) + 0.5) / f64::from(grid)) / f64::from(height);
+            let [x, y] = self.within(sample);
+            let (x, y) = ((f64::from(column) + x) / f64::from(width), (f64::from(row) + y) / f64::from(height));
             let (origin, direction) = camera.ray(2.0 * x - 1.0, 1.0 - 2.0 * y, aspect);
             let scene = tracer.scene;
             match tracer.seen(&tracer.free_ray(origin, direction), pixel * grid * grid + sample) {
                 Found::Back => {}
                 Found::Escaped => {
-                    shine(scene.sky.luminance(direction, scene.up.direction()));
+                    let luminance = scene.sky.luminance(direction, scene.up.direction());
+                    (0..3).for_each(|band| sky[band] += share * luminance[band]);
                 }
                 Found::Surface { triangle, uv, side, .. } => {
                     let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
                     let at = tracer.mesh.surface(triangle as usize, uv);
-                    let glows = shine(scene.emitted_luminance(at));
+                    let emitted = scene.emitted_luminance(at).map(|luminance| share * luminance);
                     let point = tracer.mesh.point(triangle as usize, uv);
-                    let sample = |side: Side, given_back: Bands, behind: bool| {
+                    let sample = |side: Side, given_back: Bands, behind: bool, emitted: Bands| {
                         let normal = shading_normal(tracer, triangle as usize, uv, side);
                         let response = given_back.map(|given| given * share / std::f32::consts::PI);
-                        Seen { pixel, place: Place { point, normal, triangle }, uv, side, response, behind, glows }
+                        let place = Place { point, normal, triangle };
+                        Seen { pixel, place, uv, side, response, behind, share, emitted }
                     };
-                    surface(sample(side, scene.reflectance(at), false));
+                    surface(sample(side, scene.reflectance(at), false, emitted));
                     let transmittance = scene.transmittance(at);
                     if transmittance.iter().any(|t| *t > 0.0) {
-                        surface(sample(side.other(), transmittance, true));
+                        surface(sample(side.other(), transmittance, true, [0.0; 3]));
                     }
                 }
             }
         }
-        (own, part)
+        sky
+    }
+
+    /// Where in a pixel a sample lies: on a net of which each column and row has one (Hammersley 1960, "Monte Carlo methods for solving
+    /// multivariable problems"), so that edges that are nearly upright or level have as many steps as there are samples. The first
+    /// lies near the middle.
+    fn within(&self, sample: u32) -> [f64; 2] {
+        let count = self.grid * self.grid;
+        let k = (sample + 3 * count / 8) % count;
+        let half = 0.5 / f64::from(count);
+        [f64::from(k) / f64::from(count) + half, f64::from(k.reverse_bits()) / 2f64.powi(32) + half]
+    }
+}
+
+impl Seen {
+    /// Luminance that the pixel gains, with an irradiance in lux per band.
+    fn gives(&self, irradiance: Bands) -> Bands {
+        std::array::from_fn(|band| self.emitted[band] + self.response[band] * irradiance[band])
+    }
+
+    fn glows(&self) -> bool {
+        self.emitted.iter().any(|l| *l > 0.0)
     }
 }
 
 /// Adds a sample to what the pixel, from `first` on, has seen: to one of the same surface and side, if there is one.
 fn add(tracer: &Tracer, seen: &mut Vec<Seen>, first: usize, sample: Seen) {
     match seen[first..].iter_mut().find(|seen| is_shared(tracer, seen, &sample)) {
-        Some(seen) => (0..3).for_each(|band| seen.response[band] += sample.response[band]),
+        Some(seen) => {
+            seen.share += sample.share;
+            (0..3).for_each(|band| {
+                seen.response[band] += sample.response[band];
+                seen.emitted[band] += sample.emitted[band];
+            });
+        }
         None => seen.push(sample),
     }
 }
@@ -201,7 +228,7 @@ fn add(tracer: &Tracer, seen: &mut Vec<Seen>, first: usize, sample: Seen) {
 fn is_shared(tracer: &Tracer, seen: &Seen, sample: &Seen) -> bool {
     seen.side == sample.side
         && seen.behind == sample.behind
-        && seen.glows == sample.glows
+        && seen.glows() == sample.glows()
         && seen.place.normal.dot(sample.place.normal) > SAME_SURFACE
         && continues(tracer, seen, sample.place.triangle)
 }
@@ -233,22 +260,20 @@ pub struct Picture {
     pub pixels: Vec<Bands>,
     /// Whether a pixel shows a surface; sky and void are not metered.
     pub surfaces: Vec<bool>,
-    /// What emits light, or the sky, where it fills a part of a pixel, in order: edges of lamps that are brighter than white are smooth only
-    /// if each part is tone-mapped by itself. Lamps before what emits light too, however little, are not told from it.
-    pub glows: Vec<Glow>,
+    /// Parts of pixels that show several surfaces, or one and the sky, by pixel: edges of what is brighter than white, as lamps are, are
+    /// smooth only if each part is tone-mapped by itself.
+    pub parts: Vec<Part>,
 }
 
-/// A part of a pixel that emits light.
+/// What a pixel shows of one surface, or of the sky.
 #[derive(Clone, Copy, Debug)]
-pub struct Glow {
+pub struct Part {
     /// Pixel, row-major from the top left.
     pub pixel: u32,
-    /// Part of its samples, more than none and less than all.
+    /// Part of its samples.
     pub share: f32,
-    /// What they add to the pixel's luminance, cd/m² per band.
+    /// What it adds to the pixel's luminance, cd/m² per band.
     pub luminance: Bands,
-    /// What all others add.
-    pub rest: Bands,
 }
 
 impl Picture {
@@ -271,22 +296,23 @@ impl Picture {
         let factor = exposure.exp2() as f32;
         let width = self.width.max(1) as usize;
         let map = |luminance: Bands| tone_map(luminance.map(|l| l * factor));
-        let mapped = |(i, pixel): (usize, &Bands)| match self.glows.binary_search_by_key(&(i as u32), |glow| glow.pixel)
-        {
-            Err(_) => map(*pixel),
-            Ok(at) => {
-                let Glow { share, luminance, rest, .. } = self.glows[at];
-                let (glow, others) = (map(luminance.map(|l| l / share)), map(rest.map(|l| l / (1.0 - share))));
-                std::array::from_fn(|band| share * glow[band] + (1.0 - share) * others[band])
+        let mapped = |i: usize| {
+            let first = self.parts.partition_point(|part| (part.pixel as usize) < i);
+            let parts = || self.parts[first..].iter().take_while(|part| part.pixel as usize == i);
+            if parts().next().is_none() {
+                return map(self.pixels[i]);
             }
+            parts().fold([0.0; 3], |sum: Bands, part| {
+                let own = map(part.luminance.map(|l| l / part.share));
+                std::array::from_fn(|band| sum[band] + part.share * own[band])
+            })
         };
-        self.pixels
-            .par_iter()
-            .enumerate()
-            .map(|(i, pixel)| {
+        (0..self.pixels.len())
+            .into_par_iter()
+            .map(|i| {
                 // A quarter of a step of ordered dither hides the banding of 8 bits on smooth walls.
                 let dither = (BAYER[i / width % 4][i % width % 4] as f32 + 0.5) / 16.0 - 0.5;
-                mapped((i, pixel)).map(|c| (srgb(c) * 255.0 + 0.5 + dither * 0.9).clamp(0.0, 255.0) as u8)
+                mapped(i).map(|c| (srgb(c) * 255.0 + 0.5 + dither * 0.9).clamp(0.0, 255.0) as u8)
             })
             .collect()
     }
@@ -343,7 +369,7 @@ mod tests {
         // The upper half shows a bright sky, which must not count.
         let pixels = (0..16).map(|i| if i < 8 { [1e5; 3] } else { [300.0; 3] }).collect();
         let surfaces = (0..16).map(|i| i >= 8).collect();
-        let picture = Picture { width: 4, height: 4, pixels, surfaces, glows: Vec::new() };
+        let picture = Picture { width: 4, height: 4, pixels, surfaces, parts: Vec::new() };
         let factor = picture.exposure().exp2() * 300.0;
         assert!((factor - 0.24).abs() < 1e-3, "{factor}");
         let mapped = picture.tone_mapped(picture.exposure());
@@ -368,17 +394,35 @@ mod tests {
         let view = ViewRays::new(&tracer, &camera, 24, 24);
         // Of the light that the lamp reflects nothing is taken for the floor's.
         let picture = view.picture(&vec![[100.0 * std::f32::consts::TAU; 3]; view.seen.len()]);
-        assert!((24..72).contains(&picture.glows.len()), "{}", picture.glows.len());
+        assert!((16..72).contains(&(picture.parts.len() / 2)), "{}", picture.parts.len());
         let mapped = picture.tone_mapped((0.24f64 / 100.0).log2());
         let [floor, lamp] = [mapped[23][0], mapped[23 * 24][0]].map(f64::from);
         assert!(lamp > floor + 90.0, "{lamp} {floor}");
         let linear = |c: f64| (c / 255.0).powf(2.2);
-        for glow in &picture.glows {
-            let at = glow.pixel as usize;
+        for [one, other] in picture.parts.as_chunks().0 {
+            let at = one.pixel as usize;
+            assert!(other.pixel == one.pixel && (one.share + other.share - 1.0).abs() < 1e-6);
+            let glow = if one.luminance[0] > other.luminance[0] { one } else { other };
             let all = 1e4 * glow.share + 100.0;
             assert!((picture.pixels[at][0] / all - 1.0).abs() < 1e-4, "{} {all}", picture.pixels[at][0]);
             let share = (linear(f64::from(mapped[at][0])) - linear(floor)) / (linear(lamp) - linear(floor));
             assert!((share - f64::from(glow.share)).abs() < 0.04, "{share} {}", glow.share);
+        }
+    }
+
+    /// Each of sixteen columns and rows of a pixel has a sample, the first near its middle; so have fewer.
+    #[test]
+    fn samples_lie_in_columns_and_rows_of_their_own() {
+        for grid in [1, 2, 4] {
+            let frame = Frame { width: 1, height: 1, grid };
+            let count = grid * grid;
+            for axis in 0..2 {
+                let mut lines: Vec<u32> =
+                    (0..count).map(|k| (frame.within(k)[axis] * f64::from(count)) as u32).collect();
+                lines.sort_unstable();
+                assert!(lines.into_iter().eq(0..count));
+            }
+            assert!(frame.within(0).iter().all(|x| (x - 0.5).abs() < 0.13));
         }
     }
 

@@ -104,7 +104,7 @@ impl Look {
 
     /// Relative difference of an illuminance from the exact one, by pixel.
     pub fn difference(&self, irradiance: &[[f64; 3]]) -> Vec<f32> {
-        let pixels = self.view.own.len();
+        let pixels = self.view.sky.len();
         let (mut sum, mut weight) = (vec![0f64; pixels], vec![0f64; pixels]);
         for (seen, element) in self.view.seen.iter().zip(&self.element) {
             let Some(e) = element.map(|e| e as usize) else { continue };
