@@ -141,11 +141,18 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         Ok(Some((solution.direct_by(&places, &shadowing, 0, monitor)?, shadowing.rays)))
     })?;
     let both = |(h, d): (&Bands, &Bands)| -> Bands { std::array::from_fn(|band| h[band] + d[band]) };
-    // One of each of as many runs of places; at equal steps they might all lie in one column.
+    // One in each of as many stretches of what is seen, by how much of the picture places fill: slivers are many and little is seen of them.
     let count = baked.watched.len().min(stations.len());
+    let mut seen_so_far = 0.0;
+    let sums = view.seen.iter().map(|seen| {
+        seen_so_far += f64::from(seen.share);
+        seen_so_far
+    });
+    let sums: Vec<f64> = sums.collect();
     let pick = |i: usize| {
         let jitter = f64::from(unit(hash(baked.seed ^ hash(i as u32))));
-        ((i as f64 + jitter) / count as f64 * stations.len() as f64) as usize
+        let at = (i as f64 + jitter) / count as f64 * sums.last().copied().unwrap_or(0.0);
+        sums.partition_point(|sum| *sum <= at).min(stations.len() - 1)
     };
     let watched = (0..count).map(pick).map(|i| (stations[i].place, both((&indirect[i], &direct.light[i])))).collect();
     let edges = Edges::new(&view, &indirect, direct);
