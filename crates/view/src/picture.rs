@@ -118,19 +118,19 @@ impl ViewRays {
         assert_eq!(irradiance.len(), self.seen.len());
         let (mut pixels, mut surfaces) = (self.sky.clone(), vec![false; self.sky.len()]);
         let mut parts: Vec<Part> = Vec::new();
-        let given: Vec<Bands> = self.seen.iter().zip(irradiance).map(|(seen, e)| seen.gives(*e)).collect();
         let mut begin = 0;
         for of_pixel in self.seen.chunk_by(|a, b| a.pixel == b.pixel) {
             let (pixel, first) = (of_pixel[0].pixel, parts.len());
             surfaces[pixel as usize] = true;
             let mut rest = 1.0;
-            for (seen, given) in of_pixel.iter().zip(&given[begin..]) {
+            for (seen, e) in of_pixel.iter().zip(&irradiance[begin..]) {
+                let given = seen.gives(*e);
                 let add = |sum: &mut Bands| (0..3).for_each(|band| sum[band] += given[band]);
                 add(&mut pixels[pixel as usize]);
                 match parts[first..].last_mut() {
                     // It lies behind the sheet that was seen before it.
                     Some(part) if seen.behind => add(&mut part.luminance),
-                    _ => parts.push(Part { pixel, share: seen.share, luminance: *given }),
+                    _ => parts.push(Part { pixel, share: seen.share, luminance: given }),
                 }
                 rest -= if seen.behind { 0.0 } else { seen.share };
             }
