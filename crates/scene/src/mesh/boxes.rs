@@ -3,14 +3,12 @@
 //! construction on GPUs", §3). Made in the time that sorting takes; a box of much larger triangles would surround all others.
 
 use super::Mesh;
+use crate::Curve;
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// Triangles in a box, and boxes in the next larger one: fewer make more boxes, more make each look longer.
 const WIDTH: usize = 8;
-
-/// Bits of the curve along each axis: with those of the size they fit into 64.
-const BITS: u32 = 16;
 
 /// A tree of boxes over the triangles of a mesh.
 pub(super) struct Boxes {
@@ -32,19 +30,13 @@ impl Boxes {
         let triangles = (0..mesh.triangles.len() as u32).into_par_iter();
         let all = triangles.clone().map(bounds).reduce(|| nothing, union);
         let extent = (all[1] - all[0]).max_element().max(f64::MIN_POSITIVE);
+        let curve = Curve::new(all);
 
         let mut keys: Vec<(u64, u32)> = triangles
             .map(|t| {
                 let [low, high] = bounds(t);
                 let size = ((high - low).max_element() / extent).max(1e-9).log2().floor() as i64 + 64;
-                let place = ((0.5 * (low + high) - all[0]) / extent * f64::from((1 << BITS) - 1)).as_u64vec3();
-                let mut key = size as u64;
-                for bit in (0..BITS).rev() {
-                    for axis in place.to_array() {
-                        key = key << 1 | axis >> bit & 1;
-                    }
-                }
-                (key, t)
+                ((size as u64) << 48 | curve.number(0.5 * (low + high)), t)
             })
             .collect();
         keys.par_sort_unstable();
