@@ -9,6 +9,7 @@ use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Bands, PointLight, luminance};
 use radiosity_trace::sampling::{Sequence, hash};
 use radiosity_trace::{EmitterTree, Place, Tracer};
+use smallvec::SmallVec;
 use std::f64::consts::PI;
 
 /// A shadow ray came through.
@@ -75,11 +76,18 @@ pub fn from_few(
     }
     let (mut visible, mut sampled) = ([0f64; 3], [0f64; 3]);
     let mut outcome = SAMPLED;
+    // What samples of a piece have in common is worked out for the first of them.
+    let mut aims: SmallVec<[Option<Aim>; 4]> = pieces.iter().map(|_| None).collect();
     for index in first..first + n {
-        let uv = sequence.pair(index).map(f64::from);
-        let Some((piece, target, weight)) = sample_one((pieces, factors), place, uv) else {
+        let [u, v] = sequence.pair(index).map(f64::from);
+        let (k, u) = pick_piece(factors, total, u);
+        let piece = &pieces[k];
+        let aim = aims[k].get_or_insert_with(|| Aim::new(piece, place, tiny(piece)));
+        let (target, weight) = aim.sample(piece, place, [u, v]);
+        if weight <= 0.0 {
             continue;
-        };
+        }
+        let weight = weight * total / factors[k];
         let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
         outcome |= if hidden { DARK } else { LIT };
         let tint = tint(tracer, piece, target.point);
@@ -123,12 +131,18 @@ pub fn from_many(
         let range = tree.leaves()[leaf].start as usize..tree.leaves()[leaf].end as usize;
         let own = &pieces[range];
         let mut factors = fours[leaf].seen_from(place.point, place.normal);
-        if luminance_of(unshadowed(own, place, &mut factors[..own.len()])) <= 0.0 {
+        let factors = &mut factors[..own.len()];
+        if luminance_of(unshadowed(own, place, factors)) <= 0.0 {
             continue;
         }
-        let Some((piece, target, weight)) = sample_one((own, &factors[..own.len()]), place, [u, f64::from(v)]) else {
+        let total: f64 = factors.iter().sum();
+        let (k, u) = pick_piece(factors, total, u);
+        let piece = &own[k];
+        let (target, weight) = sample_piece(piece, place, tiny(piece), [u, f64::from(v)]);
+        if weight <= 0.0 {
             continue;
-        };
+        }
+        let weight = weight * total / factors[k];
         if tracer.mutually_visible(place, &target, salt ^ hash(index)) {
             let tint = tint(tracer, piece, target.point);
             (0..3).for_each(|band| sum[band] += weight / probability * f64::from(tint[band]));
@@ -140,17 +154,11 @@ pub fn from_many(
     (sum.map(|s| s / f64::from(n)), outcome)
 }
 
-/// A piece picked by its unshadowed contribution with u, which is stretched, and a point of it by its direction; and the
-/// weight of this sample for a source of unit exitance, over the density of having taken it. None where it has none.
-fn sample_one<'p>(
-    (pieces, factors): (&'p [Piece], &[f64]),
-    place: &Place,
-    [u, v]: [f64; 2],
-) -> Option<(&'p Piece, Place, f64)> {
-    let total: f64 = factors.iter().sum();
+/// A piece picked by its unshadowed contribution to a total of more than nothing with u, which is stretched.
+fn pick_piece(factors: &[f64], total: f64, u: f64) -> (usize, f64) {
     let mut rest = u * total;
     let mut k = 0;
-    while k + 1 < pieces.len() && (rest >= factors[k] || factors[k] <= 0.0) {
+    while k + 1 < factors.len() && (rest >= factors[k] || factors[k] <= 0.0) {
         rest -= factors[k];
         k += 1;
     }
@@ -158,9 +166,7 @@ fn sample_one<'p>(
         k -= 1;
         rest = factors[k];
     }
-    let u = (rest / factors[k]).clamp(0.0, 1.0 - 1e-9);
-    let (target, weight) = sample_piece(&pieces[k], place, tiny(&pieces[k]), [u, v]);
-    (weight > 0.0).then(|| (&pieces[k], target, weight * total / factors[k]))
+    (k, (rest / factors[k]).clamp(0.0, 1.0 - 1e-9))
 }
 
 /// Exitance of a piece at a point of it.
@@ -183,29 +189,55 @@ pub fn tiny(piece: &Piece) -> f64 {
 
 /// A point of a piece and its weight: the form-factor density over the sampling density. By area where the square of the distance is beyond
 /// `far`, m², and by direction elsewhere.
-pub fn sample_piece(piece: &Piece, place: &Place, far: f64, [x, y]: [f64; 2]) -> (Place, f64) {
-    let [a, b, c] = piece.corners;
-    let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
-    // Half of all places look away or lie behind; their solid angles need not be found first.
-    let is_above = |p: &DVec3| (*p - place.point).dot(place.normal) > 0.0;
-    if (place.point - a).dot(piece.normal) <= 0.0 || !piece.corners.iter().any(is_above) {
-        return (seen(a), 0.0);
+pub fn sample_piece(piece: &Piece, place: &Place, far: f64, square: [f64; 2]) -> (Place, f64) {
+    Aim::new(piece, place, far).sample(piece, place, square)
+}
+
+/// How points of a piece are sampled from a place.
+enum Aim {
+    /// Not at all: neither sees the other.
+    Nowhere,
+    ByArea,
+    ByDirection(CosineTriangle),
+}
+
+impl Aim {
+    /// As [`sample_piece`] does.
+    fn new(piece: &Piece, place: &Place, far: f64) -> Aim {
+        let [a, b, c] = piece.corners;
+        // Half of all places look away or lie behind; their solid angles need not be found first.
+        let is_above = |p: &DVec3| (*p - place.point).dot(place.normal) > 0.0;
+        if (place.point - a).dot(piece.normal) <= 0.0 || !piece.corners.iter().any(is_above) {
+            return Aim::Nowhere;
+        }
+        if place.point.distance_squared((a + b + c) / 3.0) > far {
+            return Aim::ByArea;
+        }
+        CosineTriangle::new(place.point, place.normal, piece.corners).map_or(Aim::Nowhere, Aim::ByDirection)
     }
-    if place.point.distance_squared((a + b + c) / 3.0) > far {
-        let (p, q) = triangle_from_square(x, y);
-        let target = seen(a + p * (b - a) + q * (c - a));
-        return (target, geometry(place, &target) * piece.area);
+
+    /// A point of the same piece, seen from the same place, and its weight.
+    fn sample(&self, piece: &Piece, place: &Place, [x, y]: [f64; 2]) -> (Place, f64) {
+        let [a, b, c] = piece.corners;
+        let seen = |point| Place { point, normal: piece.normal, triangle: piece.triangle };
+        match self {
+            Aim::Nowhere => (seen(a), 0.0),
+            Aim::ByArea => {
+                let (p, q) = triangle_from_square(x, y);
+                let target = seen(a + p * (b - a) + q * (c - a));
+                (target, geometry(place, &target) * piece.area)
+            }
+            Aim::ByDirection(triangle) => {
+                let (direction, weight) = triangle.direction(x, y);
+                let towards = -direction.dot(piece.normal);
+                if weight <= 0.0 || towards <= 0.0 {
+                    return (seen(a), 0.0);
+                }
+                let reach = (place.point - a).dot(piece.normal) / towards;
+                (seen(place.point + reach * direction), weight)
+            }
+        }
     }
-    let Some(triangle) = CosineTriangle::new(place.point, place.normal, piece.corners) else {
-        return (seen(a), 0.0);
-    };
-    let (direction, weight) = triangle.direction(x, y);
-    let towards = -direction.dot(piece.normal);
-    if weight <= 0.0 || towards <= 0.0 {
-        return (seen(a), 0.0);
-    }
-    let reach = (place.point - a).dot(piece.normal) / towards;
-    (seen(place.point + reach * direction), weight)
 }
 
 /// Exitance of a piece at a point of it, where the emission is a picture.
