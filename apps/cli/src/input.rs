@@ -223,11 +223,11 @@ pub struct PictureArguments {
     /// Place that the eye looks at.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "eye", value_parser = numbers::point)]
     pub target: Option<[f64; 3]>,
-    /// Vertical angle of view from the eye; 50 by default.
-    #[arg(long, value_name = "DEGREES", requires = "eye", value_parser = numbers::angle)]
+    /// Vertical angle of view; the camera's own by default, 50 from --eye.
+    #[arg(long, value_name = "DEGREES", value_parser = numbers::angle)]
     pub fov: Option<f64>,
     /// Size; by the camera's aspect if left out.
-    #[arg(long, value_parser = numbers::size, value_name = "WxH")]
+    #[arg(long, value_parser = numbers::size, allow_hyphen_values = true, value_name = "WxH")]
     pub size: Option<(u32, u32)>,
     /// A folder for pictures on the way, frame-000.png and so on, a quarter as wide: the first within moments, of coarse elements
     /// before any ray goes between them, then one after each solve. They stay whatever becomes of the run.
@@ -245,6 +245,7 @@ impl PictureArguments {
         let given = [
             ("--camera", self.camera.is_some(), is_made || has_frames),
             ("--eye", self.eye.is_some(), is_made || has_frames),
+            ("--fov", self.fov.is_some(), is_made || has_frames),
             ("--size", self.size.is_some(), is_made || has_frames),
             ("--exposure", self.exposure.is_some(), is_exposed || has_frames),
         ];

@@ -164,7 +164,7 @@ impl ErrorReport {
         }
         let says = match self.estimated {
             estimated if percent(estimated) == percent(0.0) && self.upper_95_one_sided > 0.0 => {
-                "finds none beyond its own noise".to_owned()
+                "cannot tell it from the truth".to_owned()
             }
             estimated => format!("says {}", percent(estimated)),
         };

@@ -6,7 +6,7 @@ use crate::input::PictureArguments;
 use crate::progress::Progress;
 use crate::{Failure, numbers};
 use radiosity::io::image_out::{encode_exr, encode_png};
-use radiosity::{Camera, Picture, Scene, Shown, Sky, Tracer, View};
+use radiosity::{Camera, Picture, Projection, Scene, Shown, Sky, Tracer, View};
 use std::path::Path;
 
 /// Pictures in a report are made smaller than this, pixels: a page should open at once, and screens show no more.
@@ -97,20 +97,57 @@ pub fn encode(path: &Path, picture: &Picture, exposure: f64) -> Result<Vec<u8>, 
 /// Vertical angle of view of `--eye`, degrees, where none is given: wide enough for rooms, without stretched corners.
 const FOV: f64 = 50.0;
 
-/// The camera that was asked for by its places, name or number, else the first, else one that is placed well.
-pub fn camera(scene: &Scene, tracer: &Tracer, asked: &PictureArguments) -> Result<Camera, Failure> {
-    if let (Some(eye), Some(target)) = (asked.eye, asked.target) {
-        if eye == target {
-            return Err(Failure::input("--eye and --target are the same place; the eye must look somewhere"));
+/// The camera that was asked for by its places, name or number, else the first, else one that is placed well, of which is said where it
+/// stands; with the angle of view that was asked for.
+pub fn camera(
+    scene: &Scene,
+    tracer: &Tracer,
+    asked: &PictureArguments,
+    progress: &Progress,
+) -> Result<Camera, Failure> {
+    let (mut camera, is_placed) = match (&asked.camera, scene.cameras.first()) {
+        _ if asked.eye.is_some() => (from_eye(scene, asked)?, false),
+        (Some(wanted), _) => (named(scene, wanted)?, false),
+        (None, Some(first)) => (first.clone(), false),
+        (None, None) => {
+            let aspect = asked.size.map(|(width, height)| f64::from(width) / f64::from(height));
+            (radiosity::place_camera(tracer, aspect), true)
         }
-        let fov = asked.fov.unwrap_or(FOV).to_radians();
-        return Ok(Camera::look_at("eye", eye.into(), target.into(), scene.up.direction(), fov));
-    }
-    let Some(wanted) = &asked.camera else {
-        let aspect = asked.size.map(|(width, height)| f64::from(width) / f64::from(height));
-        return Ok(scene.cameras.first().cloned().unwrap_or_else(|| radiosity::place_camera(tracer, aspect)));
     };
-    let by_name = scene.cameras.iter().find(|c| c.name == *wanted);
+    if let Some(fov) = asked.fov {
+        let Projection::Perspective { vertical_fov } = &mut camera.projection else {
+            let name = &camera.name;
+            return Err(Failure::input(format!(
+                "--fov {fov}: the camera '{name}' projects in parallel and has no angle"
+            )));
+        };
+        *vertical_fov = fov.to_radians();
+    }
+    if let (true, Projection::Perspective { vertical_fov }) = (is_placed, camera.projection) {
+        let size = tracer.mesh.tolerance * 1e6;
+        let eye = camera.world_from_camera.w_axis.truncate();
+        let target = eye - size * camera.world_from_camera.z_axis.truncate();
+        // To a tenth of a per mille of the scene's size.
+        let decimals = (4.0 - size.log10()).ceil().clamp(0.0, 20.0) as usize;
+        let [eye, target] = [eye, target].map(|p| p.to_array().map(|x| numbers::fixed(x, decimals)).join(","));
+        let fov = numbers::fixed(vertical_fov.to_degrees(), 1);
+        progress.say(&format!("note: the camera placed for this scene is --eye {eye} --target {target} --fov {fov}"));
+    }
+    Ok(camera)
+}
+
+/// The camera at `--eye`.
+fn from_eye(scene: &Scene, asked: &PictureArguments) -> Result<Camera, Failure> {
+    let (Some(eye), Some(target)) = (asked.eye, asked.target) else { unreachable!("either requires the other") };
+    if eye == target {
+        return Err(Failure::input("--eye and --target are the same place; the eye must look somewhere"));
+    }
+    Ok(Camera::look_at("eye", eye.into(), target.into(), scene.up.direction(), FOV.to_radians()))
+}
+
+/// The camera of a name or number.
+fn named(scene: &Scene, wanted: &str) -> Result<Camera, Failure> {
+    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
     let by_number = wanted.parse::<usize>().ok().and_then(|n| scene.cameras.get(n));
     by_name.or(by_number).cloned().ok_or_else(|| {
         let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} = '{}'", c.name)).collect();

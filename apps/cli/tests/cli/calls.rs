@@ -69,7 +69,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ("check .", ".: is a folder (name the .glb"),
         ("render -o a.png --eye 1,2,3", "--target <X,Y,Z>"),
         ("render -o a.png --target 1,2,3", "--eye <X,Y,Z>"),
-        ("render -o a.png --fov 30", "--eye <X,Y,Z>"),
+        ("render -o a.png --size -5x10", "use WIDTHxHEIGHT"),
         ("render -o a.png --eye 1,2 --target 1,2,3", "three numbers, X,Y,Z"),
         ("render -o a.png --eye -1,2,3 --target -1,2,3", "the same place"),
         ("render -o a.png --eye 1,2,3 --target 0,0,0 --camera front", "cannot be used with"),

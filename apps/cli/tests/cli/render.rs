@@ -36,17 +36,34 @@ fn the_eye_is_put_where_it_is_asked() {
     // The room's own camera in other words, with another angle of view, and from where it looks to.
     let fov = (2.0 * (0.0125f64 / 0.035).atan()).to_degrees().to_string();
     let (eye, target) = ("0.278,0.273,-0.8", "0.278,0.273,0");
-    let views: [&[&str]; 4] = [
+    let views: [&[&str]; 5] = [
         &["--camera", "front"],
         &["--eye", eye, "--target", target, "--fov", &fov],
         &["--eye", eye, "--target", target, "--fov", "30"],
         &["--eye", target, "--target", eye, "--fov", &fov],
+        &["--fov", "30"],
     ];
     let pictures = views.map(|view| {
         assert_eq!(room.run(["render", "-o", "a.png"].iter().chain(&COARSE).chain(view)).code, Some(0));
         room.read("a.png")
     });
     assert!(pictures[1] == pictures[0] && pictures[2] != pictures[0] && pictures[3] != pictures[0]);
+    // An angle of view by itself is that of the scene's own camera.
+    assert!(pictures[4] == pictures[2]);
+}
+
+/// Where the program's own camera stands is told in the words that put one there.
+#[test]
+fn a_camera_that_is_placed_is_told() {
+    let room = Room::new("placed");
+    room.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let call = ["render", "a.obj", "-o", "a.png", "--error", "50%", "--rounds", "0", "--size", "32x32"];
+    let call: Vec<&str> = call.into_iter().chain(["--sky", "uniform:300"]).collect();
+    let run = room.run(&call);
+    let told = run.err.lines().find_map(|line| line.split_once("for this scene is ")).expect("a note").1.to_owned();
+    let again = room.run(call.iter().copied().chain(told.split(' ')));
+    assert_eq!((run.code, again.code), (Some(0), Some(0)), "{again:?}");
+    assert!(!again.err.contains("placed for this scene"), "{again:?}");
 }
 
 /// Pictures on the way are whole, small and many; the one at the end has the bytes that it has without them.
