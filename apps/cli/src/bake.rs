@@ -114,8 +114,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let needs_camera = wants_view
         || arguments.picture.frames.is_some()
         || arguments.picture.camera.is_some()
-        || arguments.picture.eye.is_some()
-        || arguments.picture.fov.is_some();
+        || arguments.picture.eye.is_some();
     let camera =
         needs_camera.then(|| views::camera(&input.scene, &tracer, &arguments.picture, progress)).transpose()?;
 

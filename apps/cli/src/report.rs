@@ -164,7 +164,7 @@ impl ErrorReport {
         }
         let says = match self.estimated {
             estimated if percent(estimated) == percent(0.0) && self.upper_95_one_sided > 0.0 => {
-                "cannot tell it from the truth".to_owned()
+                "cannot tell the answer from the truth".to_owned()
             }
             estimated => format!("says {}", percent(estimated)),
         };

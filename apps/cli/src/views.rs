@@ -5,6 +5,7 @@ use crate::illuminance::Illuminance;
 use crate::input::PictureArguments;
 use crate::progress::Progress;
 use crate::{Failure, numbers};
+use glam::DVec3;
 use radiosity::io::image_out::{encode_exr, encode_png};
 use radiosity::{Camera, Picture, Projection, Scene, Shown, Sky, Tracer, View};
 use std::path::Path;
@@ -105,11 +106,16 @@ pub fn camera(
     asked: &PictureArguments,
     progress: &Progress,
 ) -> Result<Camera, Failure> {
-    let (mut camera, is_placed) = match (&asked.camera, scene.cameras.first()) {
-        _ if asked.eye.is_some() => (from_eye(scene, asked)?, false),
-        (Some(wanted), _) => (named(scene, wanted)?, false),
-        (None, Some(first)) => (first.clone(), false),
-        (None, None) => {
+    let (mut camera, is_placed) = match (asked.eye.zip(asked.target), &asked.camera, scene.cameras.first()) {
+        (Some((eye, target)), ..) if eye == target => {
+            return Err(Failure::input("--eye and --target are the same place; the eye must look somewhere"));
+        }
+        (Some((eye, target)), ..) => {
+            (Camera::look_at("eye", eye.into(), target.into(), scene.up.direction(), FOV.to_radians()), false)
+        }
+        (None, Some(wanted), _) => (named(scene, wanted)?, false),
+        (None, None, Some(first)) => (first.clone(), false),
+        (None, None, None) => {
             let aspect = asked.size.map(|(width, height)| f64::from(width) / f64::from(height));
             (radiosity::place_camera(tracer, aspect), true)
         }
@@ -123,26 +129,26 @@ pub fn camera(
         };
         *vertical_fov = fov.to_radians();
     }
-    if let (true, Projection::Perspective { vertical_fov }) = (is_placed, camera.projection) {
-        let size = tracer.mesh.tolerance * 1e6;
-        let eye = camera.world_from_camera.w_axis.truncate();
-        let target = eye - size * camera.world_from_camera.z_axis.truncate();
-        // To a tenth of a per mille of the scene's size.
-        let decimals = (4.0 - size.log10()).ceil().clamp(0.0, 20.0) as usize;
-        let [eye, target] = [eye, target].map(|p| p.to_array().map(|x| numbers::fixed(x, decimals)).join(","));
-        let fov = numbers::fixed(vertical_fov.to_degrees(), 1);
-        progress.say(&format!("note: the camera placed for this scene is --eye {eye} --target {target} --fov {fov}"));
+    if is_placed {
+        progress.say(&format!("note: the camera placed for this scene is {}", in_words(&camera, scene, asked.size)));
     }
     Ok(camera)
 }
 
-/// The camera at `--eye`.
-fn from_eye(scene: &Scene, asked: &PictureArguments) -> Result<Camera, Failure> {
-    let (Some(eye), Some(target)) = (asked.eye, asked.target) else { unreachable!("either requires the other") };
-    if eye == target {
-        return Err(Failure::input("--eye and --target are the same place; the eye must look somewhere"));
-    }
-    Ok(Camera::look_at("eye", eye.into(), target.into(), scene.up.direction(), FOV.to_radians()))
+/// The options that put a camera where one is, to a tenth of a per mille of the scene's size.
+fn in_words(camera: &Camera, scene: &Scene, size: Option<(u32, u32)>) -> String {
+    let extent = scene.bounding_box().map_or(0.0, |[low, high]| (high - low).max_element());
+    let extent = if extent > 0.0 { extent } else { 1.0 };
+    let decimals = (4.0 - extent.log10()).ceil().clamp(0.0, 20.0) as usize;
+    let words = |p: DVec3| p.to_array().map(|x| numbers::fixed(x, decimals)).join(",");
+    let eye = camera.world_from_camera.w_axis.truncate();
+    let target = eye - extent * camera.world_from_camera.z_axis.truncate();
+    let (width, height) = picture_size(camera, size);
+    let fov = match camera.projection {
+        Projection::Perspective { vertical_fov } => format!(" --fov {}", numbers::fixed(vertical_fov.to_degrees(), 2)),
+        Projection::Orthographic { .. } => String::new(),
+    };
+    format!("--eye {} --target {}{fov} --size {width}x{height}", words(eye), words(target))
 }
 
 /// The camera of a name or number.

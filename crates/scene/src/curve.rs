@@ -1,8 +1,9 @@
-//! A curve that fills a box and keeps what is near together (Morton 1966, "A computer oriented geodetic data base").
+//! A curve that fills a box and keeps what is near together (Morton 1966, "A computer oriented geodetic data base"), mostly: where it leaves
+//! an eighth of the box, neighbours on either side of the border may be far apart on it.
 
 use glam::DVec3;
 
-/// Bits of a number along each axis: three axes leave room for sixteen more in 64 bits.
+/// Bits of a number along each axis.
 const BITS: u32 = 16;
 
 /// A curve through a cube: a 65,536th of its side is not told apart.
@@ -12,13 +13,16 @@ pub struct Curve {
 }
 
 impl Curve {
+    /// Bits of a number; those above are free.
+    pub const BITS: u32 = 3 * BITS;
+
     /// Through a cube whose lowest corner is that of a box from `low` to `high`, m, and whose side is the longest of that.
     pub fn new([low, high]: [DVec3; 2]) -> Curve {
         let extent = (high - low).max_element().max(f64::MIN_POSITIVE);
         Curve { low, scale: f64::from((1 << BITS) - 1) / extent }
     }
 
-    /// Where on the curve a point lies, below 2⁴⁸. What is outside the box lies where it is nearest.
+    /// Where on the curve a point lies, in [`Curve::BITS`]. What is outside the box lies where it is nearest.
     pub fn number(&self, point: DVec3) -> u64 {
         let most = DVec3::splat(f64::from((1 << BITS) - 1));
         let place = ((point - self.low) * self.scale).clamp(DVec3::ZERO, most).as_u64vec3().to_array();
@@ -60,7 +64,7 @@ mod tests {
     #[test]
     fn numbers_stay_within_their_bits() {
         let curve = Curve::new([DVec3::ZERO, DVec3::ONE]);
-        let all = (1 << (3 * BITS)) - 1;
+        let all = (1 << Curve::BITS) - 1;
         let numbers = [0.0, 1.0, 2.0, -1.0, f64::INFINITY].map(|x| curve.number(DVec3::splat(x)));
         assert_eq!(numbers, [0, all, all, 0, all]);
         // A single point has no extent, and none at all no bounds.

@@ -76,15 +76,20 @@ pub fn from_few(
     }
     let (mut visible, mut sampled) = ([0f64; 3], [0f64; 3]);
     let mut outcome = SAMPLED;
-    // What samples of a piece have in common is worked out for the first of them.
-    let mut aims: SmallVec<[Option<Aim>; 4]> = pieces.iter().map(|_| None).collect();
+    // What samples of a piece have in common is worked out for the first of them, where there are some of each.
+    let kept = if n as usize > pieces.len() { pieces.len() } else { 0 };
+    let mut aims: SmallVec<[Option<Aim>; 4]> = (0..kept).map(|_| None).collect();
     for index in first..first + n {
         let [u, v] = sequence.pair(index).map(f64::from);
         let (k, u) = pick_piece(factors, total, u);
         let piece = &pieces[k];
-        let aim = aims[k].get_or_insert_with(|| Aim::new(piece, place, tiny(piece)));
-        let (target, weight) = aim.sample(piece, place, [u, v]);
-        if weight <= 0.0 {
+        let aim = || Aim::new(piece, place, tiny(piece));
+        let (target, weight) = match aims.get_mut(k) {
+            Some(kept) => kept.get_or_insert_with(aim).sample(piece, place, [u, v]),
+            None => aim().sample(piece, place, [u, v]),
+        };
+        let has_weight = weight > 0.0;
+        if !has_weight {
             continue;
         }
         let weight = weight * total / factors[k];
@@ -139,7 +144,8 @@ pub fn from_many(
         let (k, u) = pick_piece(factors, total, u);
         let piece = &own[k];
         let (target, weight) = sample_piece(piece, place, tiny(piece), [u, f64::from(v)]);
-        if weight <= 0.0 {
+        let has_weight = weight > 0.0;
+        if !has_weight {
             continue;
         }
         let weight = weight * total / factors[k];
@@ -246,4 +252,42 @@ fn emission_at(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
     let at = tracer.mesh.surface(piece.triangle as usize, uv);
     let opacity = tracer.scene.opacity(at);
     tracer.scene.emitted_luminance(at).map(|l| opacity * l * std::f32::consts::PI)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use radiosity_scene::{Material, Mesh, Scene, Side};
+
+    /// What samples have in common changes none of them: many at once are those that are taken one by one.
+    #[test]
+    fn samples_of_a_light_are_those_taken_alone() {
+        let p = |x: f64, z: f64| DVec3::new(x, 0.0, z);
+        let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
+        scene.add_quad("floor", 0, [p(-1.0, -1.0), p(-1.0, 1.0), p(1.0, 1.0), p(1.0, -1.0)]);
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let lamp = [(-0.3, 0.2), (0.4, -0.1), (0.4, 0.5)].map(|(x, z)| DVec3::new(x, 0.4, z));
+        let piece = |corners: [DVec3; 3]| {
+            let [a, b, c] = corners;
+            let cross = (b - a).cross(c - a);
+            let (normal, area) = (cross.normalize(), 0.5 * cross.length());
+            Piece { triangle: 7, side: Side::Front, corners, normal, exitance: [3.0, 2.0, 1.0], area, varied: false }
+        };
+        let [a, b, c] = lamp;
+        let pieces = [piece(lamp), piece([a, c, b]), piece([a + 0.5, b + 0.5, c + 0.5])];
+        let (factors, here) = ([0.2, 0.05, 0.3], [1.0; 3]);
+        let place = Place { point: p(0.1, 0.2), normal: DVec3::Y, triangle: 0 };
+        let sequence = Sequence::new(5, 0);
+        let some = |first: u32, n: u32| {
+            from_few((&pieces, &factors), here, &tracer, &place, (&sequence, first, n), (u32::MAX, 3)).0
+        };
+        let n = 16;
+        let mut alone = [0.0; 3];
+        for e in (0..n).map(|index| some(index, 1)) {
+            (0..3).for_each(|band| alone[band] += e[band]);
+        }
+        assert_eq!(some(0, n), alone.map(|e| e / f64::from(n)));
+        assert!(alone[0] > 0.0);
+    }
 }

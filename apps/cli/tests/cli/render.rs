@@ -1,6 +1,6 @@
 //! `radiosity render`.
 
-use crate::{COARSE, Room};
+use crate::{COARSE, LAMP, Room};
 use serde_json::Value;
 use std::fs;
 
@@ -57,13 +57,46 @@ fn the_eye_is_put_where_it_is_asked() {
 fn a_camera_that_is_placed_is_told() {
     let room = Room::new("placed");
     room.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    let call = ["render", "a.obj", "-o", "a.png", "--error", "50%", "--rounds", "0", "--size", "32x32"];
-    let call: Vec<&str> = call.into_iter().chain(["--sky", "uniform:300"]).collect();
-    let run = room.run(&call);
+    let call = ["render", "a.obj", "-o", "a.png", "--error", "50%", "--rounds", "0", "--sky", "uniform:300"];
+    let run = room.run(call);
+    // Width and height in the first chunk of a PNG.
+    let size = || room.read("a.png")[16..24].to_owned();
+    let first = size();
     let told = run.err.lines().find_map(|line| line.split_once("for this scene is ")).expect("a note").1.to_owned();
-    let again = room.run(call.iter().copied().chain(told.split(' ')));
-    assert_eq!((run.code, again.code), (Some(0), Some(0)), "{again:?}");
-    assert!(!again.err.contains("placed for this scene"), "{again:?}");
+    let words: Vec<&str> = told.split(' ').collect();
+    let ["--eye", eye, "--target", target, "--fov", fov, "--size", _] = words[..] else { panic!("{told}") };
+
+    let scene = radiosity::io::load(&room.path("a.obj"), &Default::default()).unwrap().scene;
+    let mesh = radiosity::Mesh::new(&scene);
+    let camera = radiosity::place_camera(&radiosity::Tracer::new(&scene, &mesh), None);
+    let place = |text: &str| text.split(',').map(|x| x.parse::<f64>().unwrap()).collect::<Vec<_>>();
+    let (eye, target) = (place(eye), place(target));
+    for axis in 0..3 {
+        let (at, back) = (camera.world_from_camera.w_axis[axis], camera.world_from_camera.z_axis[axis]);
+        assert!((eye[axis] - at).abs() < 1e-4 && (eye[axis] - target[axis] - back).abs() < 2e-4, "{told}");
+    }
+    let radiosity::Projection::Perspective { vertical_fov } = camera.projection else { panic!("{camera:?}") };
+    assert!((fov.parse::<f64>().unwrap() - vertical_fov.to_degrees()).abs() < 0.01, "{told}");
+
+    let again = room.run(call.iter().chain(&words));
+    assert!(!again.err.contains("for this scene is"), "{again:?}");
+    assert_eq!((again.code, size()), (Some(0), first));
+}
+
+/// A parallel camera has no angle of view to change.
+#[test]
+fn parallel_cameras_have_no_angle() {
+    let room = Room::new("parallel");
+    let camera = r#"{"cameras":[{"name":"plan","type":"orthographic","orthographic":{"xmag":1,"ymag":1,"znear":0.1,"zfar":9}}],"#;
+    let scene = LAMP.replacen('{', camera, 1).replace(r#""nodes":[0,1]"#, r#""nodes":[0,1,2]"#);
+    room.write(
+        "a.gltf",
+        &scene
+            .replace(r#""nodes":[{"mesh":0}"#, r#""nodes":[{"mesh":0},{"camera":0}"#)
+            .replace(r#"{"camera":0},{"translation""#, r#"{"camera":0,"translation":[0,1,0]},{"translation""#),
+    );
+    let run = room.run(["render", "a.gltf", "-o", "a.png", "--fov", "30"]);
+    assert!(run.code == Some(2) && run.err.contains("'plan' projects in parallel"), "{run:?}");
 }
 
 /// Pictures on the way are whole, small and many; the one at the end has the bytes that it has without them.

@@ -36,7 +36,7 @@ impl Boxes {
             .map(|t| {
                 let [low, high] = bounds(t);
                 let size = ((high - low).max_element() / extent).max(1e-9).log2().floor() as i64 + 64;
-                ((size as u64) << 48 | curve.number(0.5 * (low + high)), t)
+                ((size as u64) << Curve::BITS | curve.number(0.5 * (low + high)), t)
             })
             .collect();
         keys.par_sort_unstable();
