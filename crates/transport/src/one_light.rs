@@ -80,19 +80,10 @@ pub fn from_few(
     let kept = if n as usize > pieces.len() { pieces.len() } else { 0 };
     let mut aims: SmallVec<[Option<Aim>; 4]> = (0..kept).map(|_| None).collect();
     for index in first..first + n {
-        let [u, v] = sequence.pair(index).map(f64::from);
-        let (k, u) = pick_piece(factors, total, u);
-        let piece = &pieces[k];
-        let aim = || Aim::new(piece, place, tiny(piece));
-        let (target, weight) = match aims.get_mut(k) {
-            Some(kept) => kept.get_or_insert_with(aim).sample(piece, place, [u, v]),
-            None => aim().sample(piece, place, [u, v]),
-        };
-        let has_weight = weight > 0.0;
-        if !has_weight {
+        let uv = sequence.pair(index).map(f64::from);
+        let Some((piece, target, weight)) = sample_one((pieces, factors), place, uv, &mut aims) else {
             continue;
-        }
-        let weight = weight * total / factors[k];
+        };
         let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
         outcome |= if hidden { DARK } else { LIT };
         let tint = tint(tracer, piece, target.point);
@@ -136,19 +127,13 @@ pub fn from_many(
         let range = tree.leaves()[leaf].start as usize..tree.leaves()[leaf].end as usize;
         let own = &pieces[range];
         let mut factors = fours[leaf].seen_from(place.point, place.normal);
-        let factors = &mut factors[..own.len()];
-        if luminance_of(unshadowed(own, place, factors)) <= 0.0 {
+        if luminance_of(unshadowed(own, place, &mut factors[..own.len()])) <= 0.0 {
             continue;
         }
-        let total: f64 = factors.iter().sum();
-        let (k, u) = pick_piece(factors, total, u);
-        let piece = &own[k];
-        let (target, weight) = sample_piece(piece, place, tiny(piece), [u, f64::from(v)]);
-        let has_weight = weight > 0.0;
-        if !has_weight {
+        let (some, uv) = ((own, &factors[..own.len()]), [u, f64::from(v)]);
+        let Some((piece, target, weight)) = sample_one(some, place, uv, &mut []) else {
             continue;
-        }
-        let weight = weight * total / factors[k];
+        };
         if tracer.mutually_visible(place, &target, salt ^ hash(index)) {
             let tint = tint(tracer, piece, target.point);
             (0..3).for_each(|band| sum[band] += weight / probability * f64::from(tint[band]));
@@ -160,11 +145,19 @@ pub fn from_many(
     (sum.map(|s| s / f64::from(n)), outcome)
 }
 
-/// A piece picked by its unshadowed contribution to a total of more than nothing with u, which is stretched.
-fn pick_piece(factors: &[f64], total: f64, u: f64) -> (usize, f64) {
+/// A piece picked by its unshadowed contribution with u, which is stretched, and a point of it by its direction; and the
+/// weight of this sample for a source of unit exitance, over the density of having taken it. None where it has none. `aims` keeps how each
+/// piece is sampled from the place; where it has no room for one, that is worked out anew.
+fn sample_one<'p>(
+    (pieces, factors): (&'p [Piece], &[f64]),
+    place: &Place,
+    [u, v]: [f64; 2],
+    aims: &mut [Option<Aim>],
+) -> Option<(&'p Piece, Place, f64)> {
+    let total: f64 = factors.iter().sum();
     let mut rest = u * total;
     let mut k = 0;
-    while k + 1 < factors.len() && (rest >= factors[k] || factors[k] <= 0.0) {
+    while k + 1 < pieces.len() && (rest >= factors[k] || factors[k] <= 0.0) {
         rest -= factors[k];
         k += 1;
     }
@@ -172,7 +165,13 @@ fn pick_piece(factors: &[f64], total: f64, u: f64) -> (usize, f64) {
         k -= 1;
         rest = factors[k];
     }
-    (k, (rest / factors[k]).clamp(0.0, 1.0 - 1e-9))
+    let (piece, u) = (&pieces[k], (rest / factors[k]).clamp(0.0, 1.0 - 1e-9));
+    let aim = || Aim::new(piece, place, tiny(piece));
+    let (target, weight) = match aims.get_mut(k) {
+        Some(kept) => kept.get_or_insert_with(aim).sample(piece, place, [u, v]),
+        None => aim().sample(piece, place, [u, v]),
+    };
+    (weight > 0.0).then(|| (piece, target, weight * total / factors[k]))
 }
 
 /// Exitance of a piece at a point of it.
