@@ -410,6 +410,34 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
+    /// An audit that sees nothing but its own noise does not say that there is no error.
+    #[test]
+    fn an_error_that_is_not_seen_is_not_none() {
+        let line = |estimated: f64| {
+            ErrorReport {
+                asked: 0.05,
+                achieved: true,
+                out_of_time: false,
+                estimated,
+                upper_95_one_sided: 0.02,
+                lower_95_one_sided: 0.0,
+                bias: 0.0,
+                bias_standard_error: 0.0,
+                points: 100,
+                paths_per_estimate: 48,
+                mean_illuminance: 10.0,
+                seed: 1,
+                solution_estimated: estimated,
+                solution_upper_95_one_sided: 0.02,
+                finer: String::new(),
+            }
+            .line()
+        };
+        let [unseen, seen] = [0.0, 0.01].map(line);
+        assert!(unseen.contains("reached; audit cannot tell the answer from the truth, at most 2.000 %"), "{unseen}");
+        assert!(seen.contains("reached; audit says 1.000 %, at most 2.000 %"), "{seen}");
+    }
+
     #[test]
     fn dates_are_those_of_the_calendar() {
         for (seconds, date) in [

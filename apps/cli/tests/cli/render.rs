@@ -89,12 +89,7 @@ fn parallel_cameras_have_no_angle() {
     let room = Room::new("parallel");
     let camera = r#"{"cameras":[{"name":"plan","type":"orthographic","orthographic":{"xmag":1,"ymag":1,"znear":0.1,"zfar":9}}],"#;
     let scene = LAMP.replacen('{', camera, 1).replace(r#""nodes":[0,1]"#, r#""nodes":[0,1,2]"#);
-    room.write(
-        "a.gltf",
-        &scene
-            .replace(r#""nodes":[{"mesh":0}"#, r#""nodes":[{"mesh":0},{"camera":0}"#)
-            .replace(r#"{"camera":0},{"translation""#, r#"{"camera":0,"translation":[0,1,0]},{"translation""#),
-    );
+    room.write("a.gltf", &scene.replace(r#"{"mesh":0},"#, r#"{"mesh":0},{"camera":0,"translation":[0,1,0]},"#));
     let run = room.run(["render", "a.gltf", "-o", "a.png", "--fov", "30"]);
     assert!(run.code == Some(2) && run.err.contains("'plan' projects in parallel"), "{run:?}");
 }
