@@ -9,6 +9,7 @@
 
 use crate::Error;
 use radiosity_scene::{Bands, luminance};
+use radiosity_transport::Halves;
 use std::collections::BTreeMap;
 
 /// Doublings of the rays at a time at most: what asks for more than thirty-two times as many is a place with a lamp in its face.
@@ -45,37 +46,18 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    /// By a half of so many rays, and another one of those that need it. `evened` makes standard errors, lx, of the light and what halves
-    /// differ by from it, which is no number where it is known that they do not.
-    ///
-    /// # Errors
-    /// Those of the second half.
-    pub fn of_lit(
-        Lit { light: mut first, is_exact }: Lit,
-        second: impl FnOnce(&[usize]) -> Result<Lit, Error>,
-        rays: u32,
-        evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>,
-    ) -> Result<Found, Error> {
-        let unsure: Vec<usize> = (0..first.len()).filter(|i| !is_exact[*i]).collect();
-        let mut apart = vec![f32::NAN; first.len()];
-        for (&i, other) in unsure.iter().zip(second(&unsure)?.light) {
-            let half = first[i];
-            apart[i] = halved([half, other]);
-            first[i] = mean([half, other]);
-        }
-        let mut noise = evened(&first, &apart);
-        is_exact.iter().zip(&mut noise).filter(|(is_exact, _)| **is_exact).for_each(|(_, noise)| *noise = 0.0);
-        Ok(Found { rays: vec![rays; first.len()], light: first, noise })
-    }
-
-    /// By two halves, of so many rays together. `evened` makes standard errors, lx, of the light and what halves differ by from it.
+    /// By two halves, of so many rays together, and whether what they say is known without any chance. `evened` makes standard errors, lx, of
+    /// the light and what halves differ by from it, which is no number where it is known that they do not.
     pub fn of_halves(
-        halves: impl IntoIterator<Item = [Bands; 2]>,
+        halves: impl IntoIterator<Item = Halves>,
         rays: u32,
         evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>,
     ) -> Found {
-        let (light, apart): (Vec<Bands>, Vec<f32>) = halves.into_iter().map(|both| (mean(both), halved(both))).unzip();
-        let noise = evened(&light, &apart);
+        let apart = |half: &Halves| if half.is_exact { f32::NAN } else { halved(half.light) };
+        let (light, apart): (Vec<Bands>, Vec<f32>) =
+            halves.into_iter().map(|half| (mean(half.light), apart(&half))).unzip();
+        let mut noise = evened(&light, &apart);
+        apart.iter().zip(&mut noise).filter(|(apart, _)| apart.is_nan()).for_each(|(_, noise)| *noise = 0.0);
         Found { rays: vec![rays; light.len()], light, noise }
     }
 

@@ -7,7 +7,7 @@ use glam::DVec2;
 use radiosity_scene::elements::ElementId;
 use radiosity_scene::{Bands, Side};
 use radiosity_trace::Place;
-use radiosity_transport::{PointReceivers, Receivers, Shadowing};
+use radiosity_transport::{Halves, PointReceivers, Receivers, Shadowing};
 use radiosity_view::Field;
 use rayon::prelude::*;
 
@@ -141,8 +141,31 @@ impl Solution<'_> {
         salt: u32,
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error> {
-        let shaded: Vec<bool> = places.par_iter().map(|place| self.may_be_shaded(place)).collect();
+        let shaded = self.shaded(places);
         self.direct_of(&PointReceivers { places, shaded: &shaded, salt }, shadowing, monitor)
+    }
+
+    /// The same by two halves, of so many shadow rays each.
+    pub(crate) fn direct_halves_at(
+        &self,
+        places: &[Place],
+        shadowing: &Shadowing,
+        salt: u32,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Halves>, Error> {
+        let shaded = self.shaded(places);
+        self.direct_halves_of(&PointReceivers { places, shaded: &shaded, salt }, shadowing, monitor)
+    }
+
+    /// Direct irradiance of receivers by two halves.
+    pub(crate) fn direct_halves_of(
+        &self,
+        receivers: &impl Receivers,
+        shadowing: &Shadowing,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Halves>, Error> {
+        let halves = || self.luminaires.halves(self.tracer(), receivers, shadowing, &Watch(monitor));
+        Ok(self.stages.time(monitor, "direct light", halves)?)
     }
 
     /// Direct irradiance of receivers.
@@ -159,13 +182,16 @@ impl Solution<'_> {
         Ok(Lit { light, is_exact })
     }
 
-    /// Whether any light may be hidden from a place: whether any shadow ray of its cell was stopped. Of places in the open
+    /// Whether any light may be hidden from each place: whether any shadow ray of its cell was stopped. Of places in the open
     /// nothing is known.
-    fn may_be_shaded(&self, place: &Place) -> bool {
-        self.element_at(place).is_none_or(|element| {
-            let mut cell = self.elements.of_cell(self.elements.cell(element));
-            cell.any(|e| self.columns.is_shaded(e as usize))
-        })
+    fn shaded(&self, places: &[Place]) -> Vec<bool> {
+        let may_be_shaded = |place: &Place| {
+            self.element_at(place).is_none_or(|element| {
+                let mut cell = self.elements.of_cell(self.elements.cell(element));
+                cell.any(|e| self.columns.is_shaded(e as usize))
+            })
+        };
+        places.par_iter().map(may_be_shaded).collect()
     }
 
     /// Irradiance of the elements that places lie on, lux per band; 0 in the open.

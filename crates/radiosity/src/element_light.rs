@@ -8,7 +8,7 @@ use glam::DVec3;
 use radiosity_scene::{Bands, ElementId, Elements, Side};
 use radiosity_trace::sampling::hash;
 use radiosity_trace::{Place, Tracer};
-use radiosity_transport::{ElementReceivers, Exposure, Receivers, Shadowing, Site};
+use radiosity_transport::{ElementReceivers, Exposure, Halves, Receivers, Shadowing, Site};
 use radiosity_view::Planes;
 
 /// Gather rays and shadow rays of an element to begin with, those of both halves. Neighbours share them.
@@ -21,6 +21,11 @@ const FROM_EACH: usize = 4;
 struct Open<'a> {
     all: ElementReceivers<'a>,
     own: Vec<ElementId>,
+}
+
+/// So many rays of an element, by its places.
+fn shadowing(rays: usize) -> Shadowing {
+    Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 }
 }
 
 /// Some of them; each `salt` has rays of its own.
@@ -86,8 +91,17 @@ impl Asked for Open<'_> {
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error> {
-        let shadowing = Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 };
-        solution.direct_of(&Part { open: self, own, salt }, &shadowing, monitor)
+        solution.direct_of(&Part { open: self, own, salt }, &shadowing(rays), monitor)
+    }
+
+    fn direct_halves(
+        &self,
+        solution: &Solution,
+        own: &[usize],
+        (rays, salt): (usize, u32),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Halves>, Error> {
+        solution.direct_halves_of(&Part { open: self, own, salt }, &shadowing(rays), monitor)
     }
 
     fn gathered(

@@ -6,7 +6,7 @@ use crate::{Error, Monitor, Solution};
 use glam::DVec3;
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::Shadowing;
+use radiosity_transport::{Halves, Shadowing};
 use radiosity_view::{FLAT, Finding, Planes, Pooled};
 use std::time::Instant;
 
@@ -64,6 +64,15 @@ pub(crate) trait Asked {
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error>;
 
+    /// The same as two halves tell it, of so many rays each.
+    fn direct_halves(
+        &self,
+        solution: &Solution,
+        own: &[usize],
+        rays: (usize, u32),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Halves>, Error>;
+
     /// What some of them gather, as two halves of the rays tell it.
     fn gathered(
         &self,
@@ -104,6 +113,16 @@ impl Asked for &[Place] {
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error> {
         solution.direct_by(&of(self, own), &shadowing(rays), salt, monitor)
+    }
+
+    fn direct_halves(
+        &self,
+        solution: &Solution,
+        own: &[usize],
+        (rays, salt): (usize, u32),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Halves>, Error> {
+        solution.direct_halves_at(&of(self, own), &shadowing(rays), salt, monitor)
     }
 
     fn gathered(
@@ -154,12 +173,11 @@ impl<A: Asked> Light<A> {
     pub fn begin(&mut self, solution: &Solution, [gather, shadow]: Rays, monitor: &dyn Monitor) -> Result<(), Error> {
         let began = Instant::now();
         let all: Vec<usize> = (0..self.asked.len()).collect();
-        let sets = self.sets;
-        let half = |own: &[usize], set| self.asked.direct(solution, own, (shadow / 2, sets + set), monitor);
-        self.direct = Found::of_lit(half(&all, 1)?, |own| half(own, 2), shadow as u32, evened)?;
-        self.sets += 3;
+        let halves = self.asked.direct_halves(solution, &all, (shadow / 2, self.sets + 1), monitor)?;
+        self.direct = Found::of_halves(halves, shadow as u32, evened);
+        self.sets += 2;
         let halves = self.asked.gathered(solution, &all, (gather, self.sets), monitor)?;
-        self.gathered = Found::of_halves(halves, gather as u32, evened);
+        self.gathered = Found::of_halves(halves.into_iter().map(Halves::sampled), gather as u32, evened);
         self.share();
         self.seconds = began.elapsed().as_secs_f64();
         Ok(())
@@ -184,7 +202,7 @@ impl<A: Asked> Light<A> {
         self.sets += 1;
         let all: Vec<usize> = (0..self.asked.len()).collect();
         let halves = self.asked.gathered(solution, &all, (more, self.sets), monitor)?;
-        self.gathered.join(Found::of_halves(halves, more as u32, evened));
+        self.gathered.join(Found::of_halves(halves.into_iter().map(Halves::sampled), more as u32, evened));
         self.share();
         self.seconds += began.elapsed().as_secs_f64();
         Ok(())

@@ -12,6 +12,7 @@ use crate::points::{shadowing, unless_dark};
 use crate::{Error, Monitor};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
+use radiosity_transport::Halves;
 use radiosity_view::Pooled;
 use radiosity_view::lightmap::{Atlas, Texel};
 
@@ -87,7 +88,7 @@ pub(crate) fn light(
             return Ok((None, at.iter().map(alone).collect()));
         }
         let halves = solution.halves_at(&places, rays, 0, monitor)?;
-        let gathered = Found::of_halves(halves, rays as u32, evened);
+        let gathered = Found::of_halves(halves.into_iter().map(Halves::sampled), rays as u32, evened);
         let indirect = pooled(&gathered);
         Ok((Some(gathered), indirect))
     };
@@ -99,8 +100,8 @@ pub(crate) fn light(
 
     let first = gather_rays(error).min(FIRST_GATHERED);
     let shadow = rays_for(error, FIRST_SHADOW, LEAST_SHADOW, MOST_SHADOW);
-    let half = |at: &[Place], salt| solution.direct_by(at, &shadowing(shadow / 2), salt, monitor);
-    let mut direct = Found::of_lit(half(&places, 1)?, |own| half(&of(own), 2), shadow as u32, evened)?;
+    let halves = solution.direct_halves_at(&places, &shadowing(shadow / 2), 1, monitor)?;
+    let mut direct = Found::of_halves(halves, shadow as u32, evened);
     let (mut gathered, mut indirect) = shared(first)?;
     let area = sheet.atlas.areas(sheet.texels);
     let size = root_mean_square(solution);
