@@ -53,7 +53,7 @@ const OVERLAP_COST: f32 = 0.2;
 const HALVE_FROM: usize = 40;
 
 /// Depth that no binary tree exceeds; the wide tree's traversal stack is sized by it.
-#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code))]
 pub(crate) const MAX_DEPTH: usize = HALVE_FROM + 32;
 
 /// Smaller ranges are not worth handing to another thread.

@@ -11,11 +11,15 @@ mod build;
 mod collapse;
 pub mod emitters;
 mod intersect;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod portable;
 pub mod ray;
 mod shaft;
 mod spatial;
 pub mod tree;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+mod walk;
 
 pub use brute::{blocked_brute, closest_brute, closest_where_brute};
 pub use emitters::{Emitter, EmitterTree};

@@ -2,7 +2,7 @@
 //!
 //! Each node holds eight boxes, each leaf up to eight triangles in blocks of four. `build` makes a
 //! binary tree by the surface-area heuristic, `spatial` cuts triangles in parts that go to different leaves, `collapse` chooses which
-//! of its nodes remain, `avx2` and `portable` walk it, `intersect` says what a hit is. Which of two hits counts depends on them
+//! of its nodes remain, `walk` goes through it by the registers of `avx2` and `neon` and `portable` without, `intersect` says what a hit is. Which of two hits counts depends on them
 //! alone and not on the walk: the nearer one, at the same distance the one with the lower index; a back is taken to lie
 //! 2^-20 of the largest coordinate further away than it does. So answers are the same on every machine.
 
@@ -125,8 +125,8 @@ pub struct Tree {
     /// What backs are set back by.
     tie: f32,
     len: usize,
-    /// Whether the processor has what `avx2` is compiled for. Set nowhere but in [`Tree::new`] and to false in tests.
-    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+    /// Whether the processor has what `avx2` or `neon` is compiled for. Set nowhere but in [`Tree::new`] and to false in tests.
+    #[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code))]
     pub(crate) simd: bool,
 }
 
@@ -244,6 +244,11 @@ impl Tree {
             // SAFETY: `simd` is set only where the processor has AVX2 and FMA.
             return unsafe { crate::avx2::closest(self, ray, &mut accept) };
         }
+        #[cfg(target_arch = "aarch64")]
+        if self.simd {
+            // SAFETY: `simd` is set only where the processor has NEON.
+            return unsafe { crate::neon::closest(self, ray, &mut accept) };
+        }
         portable::closest(self, &self.prepared(ray)?, &mut accept)
     }
 
@@ -260,6 +265,11 @@ impl Tree {
         if self.simd {
             // SAFETY: `simd` is set only where the processor has AVX2 and FMA.
             return unsafe { crate::avx2::blocked(self, ray, &mut accept) };
+        }
+        #[cfg(target_arch = "aarch64")]
+        if self.simd {
+            // SAFETY: `simd` is set only where the processor has NEON.
+            return unsafe { crate::neon::blocked(self, ray, &mut accept) };
         }
         self.prepared(ray).is_some_and(|prepared| portable::blocked(self, &prepared, &mut accept))
     }
@@ -397,7 +407,11 @@ fn has_simd() -> bool {
     {
         is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(target_arch = "aarch64")]
+    {
+        std::arch::is_aarch64_feature_detected!("neon")
+    }
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     {
         false
     }
