@@ -10,7 +10,7 @@
 //! once per ray (no faster), boxes widened by other inverses of the direction on the sides where rays enter and leave (5 % slower in a Cornell box).
 //! Pages of 2 MiB made 4 % more rays a second in that building, and its tree took half as long again to build. Nodes and the blocks below them side by side in
 //! one array made 3 to 5 % more there and no more elsewhere. Nodes of 128 bytes, bounds as bytes about a corner of its own each,
-//! made 15 to 22 % fewer in an office and 7 to 25 % fewer in that building: rays wait for arithmetic and for guesses, not for nodes. Eight rays in turn, a step each, what they need next fetched meanwhile: single rays 1.3
+//! made 15 to 23 % fewer in an office and 8 to 24 % fewer in that building: rays wait for arithmetic and for guesses, not for nodes. Eight rays in turn, a step each, what they need next fetched meanwhile: single rays 1.3
 //! to 1.9 times as fast there, but 64 from each point, which are what there is to trace, 0.8 times.
 
 use crate::Hit;
