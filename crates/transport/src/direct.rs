@@ -480,7 +480,7 @@ impl Luminaires {
                 parts.push(Parts::default());
             }
             let (own, first) = (&mut parts[spots.len()], exact.len());
-            own.find(self, &place);
+            own.find(self, &place, rays);
             exact.resize(first + self.lights.len(), [0.0; 3]);
             let settled = own.settle(self, rays, &mut exact[first..], |light, panel, k, rays| {
                 sights.share((light, panel, k), tracer, &place, rays)

@@ -88,8 +88,8 @@ impl Panel {
 /// Cosine of what lies in one plane, at least.
 const FLAT: f64 = 1.0 - 1e-12;
 
-/// Lights with more triangles than this have them in a tree: to evaluate the polygon factor of each would cost more
-/// than the shadow rays.
+/// Lights with more triangles than this have them in a tree: for a ray or two it would cost more than these to evaluate the polygon factor
+/// of each.
 pub(crate) const MOST_EXACT_PIECES: usize = 64;
 
 /// Lights of more panels than this are looked at by rays alone: a place would look for blockers as often.
@@ -98,6 +98,15 @@ const MOST_PANELS: usize = 8;
 /// More objects that emit than this are one light: what each gives to each element would fill the memory, and to
 /// look at all of them from every place would take longer than the rays.
 const MOST_LAMPS: usize = 32;
+
+/// The triangles of a light in a tree.
+#[derive(Clone, Debug)]
+pub struct PieceTree {
+    /// Its leaves are in the order of the triangles.
+    pub(crate) tree: EmitterTree,
+    /// The triangles of each leaf.
+    pub(crate) leaves: Vec<Four>,
+}
 
 /// A source of direct light.
 #[derive(Clone, Debug)]
@@ -108,10 +117,10 @@ pub enum Light {
         name: String,
         /// Its triangles.
         pieces: Vec<Piece>,
-        /// The same by fours, or by the leaves of the tree.
+        /// The same by fours.
         fours: Vec<Four>,
-        /// The tree, where there are many; its leaves are in the order of the triangles.
-        tree: Option<EmitterTree>,
+        /// A tree, where there are many.
+        tree: Option<PieceTree>,
     },
     /// A source without area.
     Point(PointLight),
@@ -142,6 +151,8 @@ pub struct Luminaires {
     pub lights: Vec<Light>,
     /// The triangles of all lights without a tree, one after the other: lamps of two triangles would leave half of the lanes empty.
     pub(crate) few: Vec<Four>,
+    /// How many triangles lights with a tree have.
+    pub(crate) many: usize,
     /// By light, its panels, if all of them are evenly bright and there are few.
     pub(crate) panels: Vec<Vec<Panel>>,
     /// Exitance of each element (bands) that is counted through `lights` and must not be counted by rows as well.
@@ -222,7 +233,12 @@ impl Luminaires {
             if panels.len() > MOST_PANELS { Vec::new() } else { panels }
         });
         let panels = panels.collect();
-        Luminaires { lights, few: few.chunks(4).map(Four::new).collect(), panels, promoted, carried }
+        let in_trees = |light: &Light| match light {
+            Light::Area { pieces, tree: Some(_), .. } => pieces.len(),
+            _ => 0,
+        };
+        let many = lights.iter().map(in_trees).sum();
+        Luminaires { lights, few: few.chunks(4).map(Four::new).collect(), many, panels, promoted, carried }
     }
 
     /// Lights that a scene has at most, told by its objects alone.
@@ -247,13 +263,11 @@ fn area_light(name: String, mut pieces: Vec<Piece>) -> Light {
         tree
     });
     let corners: Vec<[DVec3; 3]> = pieces.iter().map(|piece| piece.corners).collect();
-    let fours = match &tree {
-        Some(tree) => {
-            tree.leaves().iter().map(|leaf| Four::new(&corners[leaf.start as usize..leaf.end as usize])).collect()
-        }
-        None => corners.chunks(4).map(Four::new).collect(),
-    };
-    Light::Area { name, pieces, fours, tree }
+    let tree = tree.map(|tree| {
+        let of_leaf = |leaf: &Range<u32>| Four::new(&corners[leaf.start as usize..leaf.end as usize]);
+        PieceTree { leaves: tree.leaves().iter().map(of_leaf).collect(), tree }
+    });
+    Light::Area { name, pieces, fours: corners.chunks(4).map(Four::new).collect(), tree }
 }
 
 /// Whether what a triangle gives varies over it.

@@ -2,13 +2,13 @@
 //!
 //! Estimators answer the irradiance in lux per band, and what became of their rays as bits.
 
-use crate::luminaires::Piece;
-use crate::polygon::{CosineTriangle, Four};
+use crate::luminaires::{Piece, PieceTree};
+use crate::polygon::CosineTriangle;
 use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Bands, PointLight, luminance};
 use radiosity_trace::sampling::{Sequence, hash};
-use radiosity_trace::{EmitterTree, Place, Tracer};
+use radiosity_trace::{Place, Tracer};
 use smallvec::SmallVec;
 use std::f64::consts::PI;
 
@@ -79,9 +79,13 @@ pub fn from_few(
     // What samples of a piece have in common is worked out for the first of them, where there are some of each.
     let kept = if n as usize > pieces.len() { pieces.len() } else { 0 };
     let mut aims: SmallVec<[Option<Aim>; 4]> = (0..kept).map(|_| None).collect();
+    let mut picks = Picks::new(factors);
+    if pieces.len() > SCANNED && n > 1 {
+        picks.add_up();
+    }
     for index in first..first + n {
         let uv = sequence.pair(index).map(f64::from);
-        let Some((piece, target, weight)) = sample_one((pieces, factors), place, uv, &mut aims) else {
+        let Some((piece, target, weight)) = sample_one((pieces, &picks), place, uv, &mut aims) else {
             continue;
         };
         let hidden = !tracer.mutually_visible(place, &target, salt ^ hash(index));
@@ -112,7 +116,7 @@ pub fn from_few(
 /// Irradiance of a place from a light of many triangles, or those below a node of its tree: one of them for each ray, by
 /// about what each gives.
 pub fn from_many(
-    (pieces, fours, tree, node): (&[Piece], &[Four], &EmitterTree, u32),
+    (pieces, PieceTree { tree, leaves }, node): (&[Piece], &PieceTree, u32),
     tracer: &Tracer,
     place: &Place,
     (sequence, first, n): Samples,
@@ -126,12 +130,12 @@ pub fn from_many(
         let Some((leaf, probability)) = tree.pick(node, place.point, place.normal, &mut u) else { continue };
         let range = tree.leaves()[leaf].start as usize..tree.leaves()[leaf].end as usize;
         let own = &pieces[range];
-        let mut factors = fours[leaf].seen_from(place.point, place.normal);
+        let mut factors = leaves[leaf].seen_from(place.point, place.normal);
         if luminance_of(unshadowed(own, place, &mut factors[..own.len()])) <= 0.0 {
             continue;
         }
-        let (some, uv) = ((own, &factors[..own.len()]), [u, f64::from(v)]);
-        let Some((piece, target, weight)) = sample_one(some, place, uv, &mut []) else {
+        let (picks, uv) = (Picks::new(&factors[..own.len()]), [u, f64::from(v)]);
+        let Some((piece, target, weight)) = sample_one((own, &picks), place, uv, &mut []) else {
             continue;
         };
         if tracer.mutually_visible(place, &target, salt ^ hash(index)) {
@@ -145,33 +149,69 @@ pub fn from_many(
     (sum.map(|s| s / f64::from(n)), outcome)
 }
 
-/// A piece picked by its unshadowed contribution with u, which is stretched, and a point of it by its direction; and the
+/// Of so few pieces one is picked by looking at one after the other.
+const SCANNED: usize = 16;
+
+/// Pieces to be picked by their unshadowed contributions, some of which are more than nothing.
+struct Picks<'f> {
+    factors: &'f [f64],
+    total: f64,
+    /// Sums up to and with each, where they are worth it.
+    up_to: Vec<f64>,
+}
+
+impl Picks<'_> {
+    fn new(factors: &[f64]) -> Picks<'_> {
+        Picks { factors, total: factors.iter().sum(), up_to: Vec::new() }
+    }
+
+    fn add_up(&mut self) {
+        let sum = |sum: &mut f64, factor: &f64| {
+            *sum += *factor;
+            Some(*sum)
+        };
+        self.up_to = self.factors.iter().scan(0.0, sum).collect();
+    }
+
+    /// One of them by a number in [0, 1), and that number stretched.
+    fn pick(&self, u: f64) -> (usize, f64) {
+        let factors = self.factors;
+        let mut rest = u * self.total;
+        let mut k = 0;
+        if self.up_to.is_empty() {
+            while k + 1 < factors.len() && (rest >= factors[k] || factors[k] <= 0.0) {
+                rest -= factors[k];
+                k += 1;
+            }
+        } else {
+            k = self.up_to.partition_point(|sum| *sum <= rest).min(factors.len() - 1);
+            rest -= if k > 0 { self.up_to[k - 1] } else { 0.0 };
+        }
+        while factors[k] <= 0.0 && k > 0 {
+            k -= 1;
+            rest = factors[k];
+        }
+        (k, (rest / factors[k]).clamp(0.0, 1.0 - 1e-9))
+    }
+}
+
+/// A piece picked with u, which is stretched, and a point of it by its direction; and the
 /// weight of this sample for a source of unit exitance, over the density of having taken it. None where it has none. `aims` keeps how each
 /// piece is sampled from the place; where it has no room for one, that is worked out anew.
 fn sample_one<'p>(
-    (pieces, factors): (&'p [Piece], &[f64]),
+    (pieces, picks): (&'p [Piece], &Picks),
     place: &Place,
     [u, v]: [f64; 2],
     aims: &mut [Option<Aim>],
 ) -> Option<(&'p Piece, Place, f64)> {
-    let total: f64 = factors.iter().sum();
-    let mut rest = u * total;
-    let mut k = 0;
-    while k + 1 < pieces.len() && (rest >= factors[k] || factors[k] <= 0.0) {
-        rest -= factors[k];
-        k += 1;
-    }
-    while factors[k] <= 0.0 && k > 0 {
-        k -= 1;
-        rest = factors[k];
-    }
-    let (piece, u) = (&pieces[k], (rest / factors[k]).clamp(0.0, 1.0 - 1e-9));
+    let (k, u) = picks.pick(u);
+    let piece = &pieces[k];
     let aim = || Aim::new(piece, place, tiny(piece));
     let (target, weight) = match aims.get_mut(k) {
         Some(kept) => kept.get_or_insert_with(aim).sample(piece, place, [u, v]),
         None => aim().sample(piece, place, [u, v]),
     };
-    (weight > 0.0).then(|| (piece, target, weight * total / factors[k]))
+    (weight > 0.0).then(|| (piece, target, weight * picks.total / picks.factors[k]))
 }
 
 /// Exitance of a piece at a point of it.

@@ -130,6 +130,70 @@ fn penumbrae_are_unbiased() {
     }
 }
 
+/// The lamp of one square in 800 triangles, with or without what hides a part of it.
+fn fine_lamp(blocker: bool) -> Scene {
+    let mut scene = lamps(0, blocker);
+    let lamp = Material { emissive: [1000.0; 3], base_color: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
+    scene.materials.push(lamp);
+    for (i, k) in (0..20).flat_map(|i| (0..20).map(move |k| (i, k))) {
+        let low = DVec3::new(0.01 * f64::from(i), 0.01 * f64::from(k), 2.0);
+        let corners = [low, low + 0.01 * DVec3::Y, low + 0.01 * (DVec3::X + DVec3::Y), low + 0.01 * DVec3::X];
+        scene.add_quad("lamp", 2, corners);
+    }
+    scene
+}
+
+/// A lamp of many triangles is as exact in full light as one of two, where there are rays enough to be worth it; and in penumbrae unbiased
+/// by its tree and without.
+#[test]
+fn lamps_of_many_triangles_are_exact_in_full_light_and_unbiased_in_penumbrae() {
+    let places: Vec<Place> = (0..20).map(|i| on_the_floor(0.1 * f64::from(i) - 0.7, 0.05)).collect();
+    for (place, e) in places.iter().zip(illuminance(&fine_lamp(false), &places, 16)) {
+        let truth = exact(place, (0.0, 0.2));
+        assert!((e - truth).abs() < 1e-5 * truth, "{e} for {truth}");
+    }
+    for x in [0.02, 0.07] {
+        let truth = exact(&on_the_floor(x, 0.1), (0.0, 0.2 - x));
+        let places: Vec<Place> = (0..4000).map(|i| on_the_floor(x, 0.1 + 1e-7 * f64::from(i))).collect();
+        for rays in [8, 16] {
+            let e = illuminance(&fine_lamp(true), &places, rays);
+            let mean = e.iter().sum::<f64>() / e.len() as f64;
+            let error = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>()).sqrt() / e.len() as f64;
+            assert!((mean - truth).abs() < 5.0 * error + 2e-3 * truth, "{x}, {rays}: {mean} for {truth} ± {error}");
+        }
+    }
+}
+
+/// Halves are estimates of the same light, each as good as all that has its rays, and independent of one another; what is known without
+/// rays is known in both.
+#[test]
+fn halves_are_independent() {
+    let x = 0.07;
+    let truth = exact(&on_the_floor(x, 0.1), (0.0, 0.2 - x));
+    let places: Vec<Place> = (0..4000).map(|i| on_the_floor(x, 0.1 + 1e-7 * f64::from(i))).collect();
+    let halves = |scene: &Scene| -> Vec<Halves> {
+        let (mesh, _, _, luminaires) = prepared(scene, 10.0);
+        let receivers = PointReceivers { places: &places, shaded: &[], salt: 0 };
+        let shadowing = Shadowing { places: 1, rays: 16 };
+        luminaires.halves(&Tracer::new(scene, &mesh), &receivers, &shadowing, &()).unwrap()
+    };
+    let found = halves(&fine_lamp(true));
+    let off = |half: &Halves, k: usize| f64::from(half.light[k][1]) - truth;
+    let sum = |f: &dyn Fn(&Halves) -> f64| found.iter().map(f).sum::<f64>() / found.len() as f64;
+    let variance = [0, 1].map(|k| sum(&|half| off(half, k).powi(2)));
+    let covariance = sum(&|half| off(half, 0) * off(half, 1));
+    for k in [0, 1] {
+        let error = (variance[k] / found.len() as f64).sqrt();
+        assert!(sum(&|half| off(half, k)).abs() < 5.0 * error + 2e-3 * truth, "half {k}");
+    }
+    assert!(variance[0] > 0.0 && !found.iter().any(|half| half.is_exact));
+    assert!(covariance.abs() < 0.1 * (variance[0] * variance[1]).sqrt(), "{covariance} of {variance:?}");
+    for half in halves(&lamps(1, true)) {
+        assert!(half.is_exact && half.light[0] == half.light[1]);
+        assert!(off(&half, 0).abs() < 1e-4 * truth);
+    }
+}
+
 /// To a light without area there is one line of sight, which a ray tells exactly, behind a blocker and beside it; unless something
 /// lets a part of the light pass, or there are fewer rays than lights.
 #[test]
@@ -423,7 +487,7 @@ fn buried_places_do_not_count_where_others_glimpse_light() {
     assert!(open > 0.0 && (with_box / open - 1.0).abs() < 0.1, "{with_box} for {open}");
 }
 
-/// Of four hundred lamps the near ones are found and the far ones not forgotten: few rays scatter about the truth, and by
+/// Of four hundred lamps the near ones are found and the far ones not forgotten: rays too few to look at all of them scatter about the truth, and by
 /// little; so does the single one of a gather.
 #[test]
 fn many_lamps_are_unbiased() {
@@ -447,13 +511,13 @@ fn many_lamps_are_unbiased() {
         };
         let truth: f64 = (0..20).flat_map(|i| (0..20).map(move |j| (i, j))).map(|(i, j)| of_lamp(i, j)).sum();
         let places: Vec<Place> = (0..2000).map(|k| on_the_floor(x, y + 1e-7 * f64::from(k))).collect();
-        let e = illuminance(&scene, &places, 64);
+        let e = illuminance(&scene, &places, 12);
         let mean = e.iter().sum::<f64>() / e.len() as f64;
         let spread = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / e.len() as f64).sqrt();
         let error = spread / (e.len() as f64).sqrt();
         // Five standard errors: a false alarm once in two million.
         assert!((mean - truth).abs() < 5.0 * error, "({x}, {y}): {mean} for {truth} ± {error}");
-        assert!(spread < 0.15 * truth, "({x}, {y}): {spread} about {truth}");
+        assert!(spread < 0.3 * truth, "({x}, {y}): {spread} about {truth}");
         let mut parts = Parts::default();
         let mut single = |seed: u32| luminaires.sample(0, &tracer, &at, hash(seed), &mut parts)[1];
         let single: Vec<f64> = (0..4000).map(&mut single).collect();
