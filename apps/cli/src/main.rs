@@ -201,3 +201,36 @@ impl From<radiosity::Error> for Failure {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// The manual has each option of each verb, in its own part or in one that verbs share.
+    #[test]
+    fn the_manual_has_every_option() {
+        let manual = include_str!("../../../docs/manual.md");
+        let part = |title: &str| {
+            let from = manual.find(title).unwrap_or_else(|| panic!("{title}"));
+            let end = manual[from + 1..].find("\n#").map_or(manual.len(), |length| from + 1 + length);
+            &manual[from..end]
+        };
+        let shared = ["\n## The scene", "\n## The solution", "\n## Pictures", "\n## Everywhere"].map(part).concat();
+        let mut missing = Vec::new();
+        for verb in Cli::command().get_subcommands() {
+            let own = format!("{}{shared}", part(&format!("\n### {}\n", verb.get_name())));
+            let has = |name: &str| {
+                let is_end = |rest: &str| !rest.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '-');
+                own.match_indices(name).any(|(at, _)| is_end(&own[at + name.len()..]))
+            };
+            let names = verb.get_arguments().filter(|argument| !argument.is_hide_set()).filter_map(|argument| {
+                argument.get_short().map(|c| format!("-{c}")).or(argument.get_long().map(|long| format!("--{long}")))
+            });
+            missing.extend(
+                names.filter(|name| !has(name) && name != "-h").map(|name| format!("{} {name}", verb.get_name())),
+            );
+        }
+        assert!(missing.is_empty(), "docs/manual.md does not have {missing:?}");
+    }
+}

@@ -9,7 +9,7 @@
 
 use crate::Error;
 use radiosity_scene::{Bands, luminance};
-use radiosity_transport::Halves;
+use radiosity_transport::HalvedLight;
 use std::collections::BTreeMap;
 
 /// Doublings of the rays at a time at most: what asks for more than thirty-two times as many is a place with a lamp in its face.
@@ -48,16 +48,11 @@ pub(crate) struct Found {
 impl Found {
     /// By two halves, of so many rays together, and whether what they say is known without any chance. `evened` makes standard errors, lx, of
     /// the light and what halves differ by from it, which is no number where it is known that they do not.
-    pub fn of_halves(
-        halves: impl IntoIterator<Item = Halves>,
-        rays: u32,
-        evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>,
-    ) -> Found {
-        let apart = |half: &Halves| if half.is_exact { f32::NAN } else { halved(half.light) };
-        let (light, apart): (Vec<Bands>, Vec<f32>) =
-            halves.into_iter().map(|half| (mean(half.light), apart(&half))).unzip();
+    pub fn of_halves(halves: &[HalvedLight], rays: u32, evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>) -> Found {
+        let apart = |half: &HalvedLight| if half.is_exact { f32::NAN } else { halved(half.light) };
+        let (light, apart): (Vec<Bands>, Vec<f32>) = halves.iter().map(|half| (mean(half.light), apart(half))).unzip();
         let mut noise = evened(&light, &apart);
-        apart.iter().zip(&mut noise).filter(|(apart, _)| apart.is_nan()).for_each(|(_, noise)| *noise = 0.0);
+        halves.iter().zip(&mut noise).filter(|(half, _)| half.is_exact).for_each(|(_, noise)| *noise = 0.0);
         Found { rays: vec![rays; light.len()], light, noise }
     }
 

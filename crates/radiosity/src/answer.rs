@@ -7,7 +7,7 @@ use glam::DVec2;
 use radiosity_scene::elements::ElementId;
 use radiosity_scene::{Bands, Side};
 use radiosity_trace::Place;
-use radiosity_transport::{Halves, PointReceivers, Receivers, Shadowing};
+use radiosity_transport::{HalvedLight, PointReceivers, Receivers, Shadowing};
 use radiosity_view::Field;
 use rayon::prelude::*;
 
@@ -91,7 +91,7 @@ impl Solution<'_> {
         let direct = self.direct_at(places, shadowing, monitor)?;
         let halves = self.halves_at(places, rays, 0, monitor)?;
         let mut answer = Answer { direct, ..Answer::default() };
-        for ([a, b], d) in halves.iter().zip(&answer.direct) {
+        for (HalvedLight { light: [a, b], .. }, d) in halves.iter().zip(&answer.direct) {
             answer.irradiance.push(std::array::from_fn(|k| d[k] + 0.5 * (a[k] + b[k])));
             answer.standard_error.push(std::array::from_fn(|k| 0.5 * (a[k] - b[k]).abs()));
         }
@@ -105,7 +105,7 @@ impl Solution<'_> {
         rays: usize,
         salt: u32,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<[Bands; 2]>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         self.halves_of(&PointReceivers { places, shaded: &[], salt }, rays, monitor)
     }
 
@@ -115,9 +115,10 @@ impl Solution<'_> {
         receivers: &impl Receivers,
         rays: usize,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<[Bands; 2]>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         let gather = || self.gather().irradiance(receivers, rays, &Watch(monitor));
-        Ok(self.stages.time(monitor, "gather", gather)?)
+        let halves = self.stages.time(monitor, "gather", gather)?;
+        Ok(halves.into_iter().map(HalvedLight::sampled).collect())
     }
 
     /// Direct irradiance of all lights at places.
@@ -152,7 +153,7 @@ impl Solution<'_> {
         shadowing: &Shadowing,
         salt: u32,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Halves>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         let shaded = self.shaded(places);
         self.direct_halves_of(&PointReceivers { places, shaded: &shaded, salt }, shadowing, monitor)
     }
@@ -163,7 +164,7 @@ impl Solution<'_> {
         receivers: &impl Receivers,
         shadowing: &Shadowing,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Halves>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         let halves = || self.luminaires.halves(self.tracer(), receivers, shadowing, &Watch(monitor));
         Ok(self.stages.time(monitor, "direct light", halves)?)
     }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use radiosity_scene::{Bands, ElementId, Elements, Side};
 use radiosity_trace::sampling::hash;
 use radiosity_trace::{Place, Tracer};
-use radiosity_transport::{ElementReceivers, Exposure, Halves, Receivers, Shadowing, Site};
+use radiosity_transport::{ElementReceivers, Exposure, HalvedLight, Receivers, Shadowing, Site};
 use radiosity_view::Planes;
 
 /// Gather rays and shadow rays of an element to begin with, those of both halves. Neighbours share them.
@@ -21,11 +21,6 @@ const FROM_EACH: usize = 4;
 struct Open<'a> {
     all: ElementReceivers<'a>,
     own: Vec<ElementId>,
-}
-
-/// So many rays of an element, by its places.
-fn shadowing(rays: usize) -> Shadowing {
-    Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 }
 }
 
 /// Some of them; each `salt` has rays of its own.
@@ -60,6 +55,11 @@ impl Receivers for Part<'_> {
     fn seed(&self, i: usize) -> u32 {
         hash(hash(self.open.own[self.own[i]]) ^ self.salt)
     }
+}
+
+/// So many rays of an element, by its places.
+fn shadowing(rays: usize) -> Shadowing {
+    Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 }
 }
 
 impl Asked for Open<'_> {
@@ -100,7 +100,7 @@ impl Asked for Open<'_> {
         own: &[usize],
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Halves>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         solution.direct_halves_of(&Part { open: self, own, salt }, &shadowing(rays), monitor)
     }
 
@@ -110,7 +110,7 @@ impl Asked for Open<'_> {
         own: &[usize],
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<[Bands; 2]>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         solution.halves_of(&Part { open: self, own, salt }, rays, monitor)
     }
 }

@@ -6,7 +6,7 @@ use crate::{Error, Monitor, Solution};
 use glam::DVec3;
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::{Halves, Shadowing};
+use radiosity_transport::{HalvedLight, Shadowing};
 use radiosity_view::{FLAT, Finding, Planes, Pooled};
 use std::time::Instant;
 
@@ -71,7 +71,7 @@ pub(crate) trait Asked {
         own: &[usize],
         rays: (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Halves>, Error>;
+    ) -> Result<Vec<HalvedLight>, Error>;
 
     /// What some of them gather, as two halves of the rays tell it.
     fn gathered(
@@ -80,7 +80,7 @@ pub(crate) trait Asked {
         own: &[usize],
         rays: (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<[Bands; 2]>, Error>;
+    ) -> Result<Vec<HalvedLight>, Error>;
 }
 
 /// Points.
@@ -121,7 +121,7 @@ impl Asked for &[Place] {
         own: &[usize],
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Halves>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         solution.direct_halves_at(&of(self, own), &shadowing(rays), salt, monitor)
     }
 
@@ -131,7 +131,7 @@ impl Asked for &[Place] {
         own: &[usize],
         (rays, salt): (usize, u32),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<[Bands; 2]>, Error> {
+    ) -> Result<Vec<HalvedLight>, Error> {
         solution.halves_at(&of(self, own), rays, salt, monitor)
     }
 }
@@ -174,10 +174,10 @@ impl<A: Asked> Light<A> {
         let began = Instant::now();
         let all: Vec<usize> = (0..self.asked.len()).collect();
         let halves = self.asked.direct_halves(solution, &all, (shadow / 2, self.sets + 1), monitor)?;
-        self.direct = Found::of_halves(halves, shadow as u32, evened);
+        self.direct = Found::of_halves(&halves, shadow as u32, evened);
         self.sets += 2;
         let halves = self.asked.gathered(solution, &all, (gather, self.sets), monitor)?;
-        self.gathered = Found::of_halves(halves.into_iter().map(Halves::sampled), gather as u32, evened);
+        self.gathered = Found::of_halves(&halves, gather as u32, evened);
         self.share();
         self.seconds = began.elapsed().as_secs_f64();
         Ok(())
@@ -202,7 +202,7 @@ impl<A: Asked> Light<A> {
         self.sets += 1;
         let all: Vec<usize> = (0..self.asked.len()).collect();
         let halves = self.asked.gathered(solution, &all, (more, self.sets), monitor)?;
-        self.gathered.join(Found::of_halves(halves.into_iter().map(Halves::sampled), more as u32, evened));
+        self.gathered.join(Found::of_halves(&halves, more as u32, evened));
         self.share();
         self.seconds += began.elapsed().as_secs_f64();
         Ok(())
@@ -236,7 +236,7 @@ impl<A: Asked> Light<A> {
         curb(&mut times, most);
         let more_gathered = self.gathered.grow((&times, for_gathered), |own, rays| {
             let halves = asked.gathered(solution, own, (rays as usize, set), monitor)?;
-            Ok(Lit::sampled(halves.into_iter().map(mean).collect()))
+            Ok(Lit::sampled(halves.into_iter().map(|half| mean(half.light)).collect()))
         })?;
         self.share();
         self.seconds += began.elapsed().as_secs_f64();

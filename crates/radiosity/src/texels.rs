@@ -12,7 +12,6 @@ use crate::points::{shadowing, unless_dark};
 use crate::{Error, Monitor};
 use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::Halves;
 use radiosity_view::Pooled;
 use radiosity_view::lightmap::{Atlas, Texel};
 
@@ -88,7 +87,7 @@ pub(crate) fn light(
             return Ok((None, at.iter().map(alone).collect()));
         }
         let halves = solution.halves_at(&places, rays, 0, monitor)?;
-        let gathered = Found::of_halves(halves.into_iter().map(Halves::sampled), rays as u32, evened);
+        let gathered = Found::of_halves(&halves, rays as u32, evened);
         let indirect = pooled(&gathered);
         Ok((Some(gathered), indirect))
     };
@@ -101,7 +100,7 @@ pub(crate) fn light(
     let first = gather_rays(error).min(FIRST_GATHERED);
     let shadow = rays_for(error, FIRST_SHADOW, LEAST_SHADOW, MOST_SHADOW);
     let halves = solution.direct_halves_at(&places, &shadowing(shadow / 2), 1, monitor)?;
-    let mut direct = Found::of_halves(halves, shadow as u32, evened);
+    let mut direct = Found::of_halves(&halves, shadow as u32, evened);
     let (mut gathered, mut indirect) = shared(first)?;
     let area = sheet.atlas.areas(sheet.texels);
     let size = root_mean_square(solution);
@@ -124,7 +123,7 @@ pub(crate) fn light(
         curb(&mut times, most_gathered.map(|most| most / first as f64));
         gathered.grow((&times, GATHERED_POWER), |own, rays| {
             let halves = solution.halves_at(&of(own), rays as usize, 1, monitor)?;
-            Ok(Lit::sampled(halves.into_iter().map(mean).collect()))
+            Ok(Lit::sampled(halves.into_iter().map(|half| mean(half.light)).collect()))
         })?;
         indirect = pooled(gathered);
     }

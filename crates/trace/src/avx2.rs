@@ -140,16 +140,16 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn distances(eight: __m256) -> [f32; WIDTH] {
+    fn distances(&self, eight: __m256) -> [f32; WIDTH] {
         let mut distances = [0.0f32; WIDTH];
-        // SAFETY: eight numbers fit; and as above.
+        // SAFETY: eight numbers fit, and there is an `Avx2` only where the processor has AVX2 and FMA.
         unsafe { _mm256_storeu_ps(distances.as_mut_ptr(), eight) };
         distances
     }
 
     #[inline(always)]
     fn triangles(&self, block: &Block, axes: [usize; 3], limit: f32, found: impl FnMut(Candidate) -> bool) -> bool {
-        // SAFETY: as above.
+        // SAFETY: there is an `Avx2` only where the processor has AVX2 and FMA.
         unsafe { self.hit(block, axes, limit, found) }
     }
 }

@@ -51,7 +51,7 @@ impl Neon {
         }
     }
 
-    /// Bits of the boxes met no later than `limit`, and the distances of all.
+    /// Bits of the boxes met no later than `limit`, which has been widened, and the distances of all.
     #[inline]
     #[target_feature(enable = "neon")]
     fn met(&self, node: &Node, limit: float32x4_t) -> (u32, [float32x4_t; 2]) {
@@ -181,9 +181,9 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
-    fn distances([low, high]: Self::Eight) -> [f32; WIDTH] {
+    fn distances(&self, [low, high]: Self::Eight) -> [f32; WIDTH] {
         let mut distances = [0.0f32; WIDTH];
-        // SAFETY: twice four numbers fit; and as above.
+        // SAFETY: twice four numbers fit, and there is a `Neon` only where the processor has it.
         unsafe {
             vst1q_f32(distances.as_mut_ptr(), low);
             vst1q_f32(distances.as_mut_ptr().add(4), high);
@@ -193,7 +193,7 @@ impl Lanes for Neon {
 
     #[inline(always)]
     fn triangles(&self, block: &Block, axes: [usize; 3], limit: f32, found: impl FnMut(Candidate) -> bool) -> bool {
-        // SAFETY: as above.
+        // SAFETY: there is a `Neon` only where the processor has it.
         unsafe { self.hit(block, axes, limit, found) }
     }
 }

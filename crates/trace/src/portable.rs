@@ -1,4 +1,4 @@
-//! The walk through the tree without SIMD intrinsics: for other processors, and as the reference for `avx2`.
+//! The walk through the tree without SIMD intrinsics: for other processors, and as the reference for `avx2` and `neon`.
 
 use crate::Hit;
 use crate::intersect::Prepared;

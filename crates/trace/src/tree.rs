@@ -274,7 +274,7 @@ impl Tree {
         self.prepared(ray).is_some_and(|prepared| portable::blocked(self, &prepared, &mut accept))
     }
 
-    /// `None` where a ray cannot hit anything. Inlined, so that `avx2` has it in registers.
+    /// `None` where a ray cannot hit anything. Inlined, so that `avx2` and `neon` have it in registers.
     #[inline(always)]
     pub(crate) fn prepared(&self, ray: &Ray) -> Option<Prepared> {
         Prepared::with_tie(ray, self.bounds?, self.tie)

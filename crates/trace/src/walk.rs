@@ -9,9 +9,9 @@
 //! eight triangles at once in single precision with the exact test for those that pass (no faster), coordinates over directions worked out
 //! once per ray (no faster), boxes widened by other inverses of the direction on the sides where rays enter and leave (5 % slower in a Cornell box).
 //! Pages of 2 MiB made 4 % more rays a second in that building, and its tree took half as long again to build. Nodes and the blocks below them side by side in
-//! one array made 3 to 5 % more there and no more elsewhere. Nodes of 128 bytes, bounds as bytes about a corner of its own each,
-//! made 15 to 23 % fewer in an office and 8 to 24 % fewer in that building: rays wait for arithmetic and for guesses, not for nodes. Eight rays in turn, a step each, what they need next fetched meanwhile: single rays 1.3
-//! to 1.9 times as fast there, but 64 from each point, which are what there is to trace, 0.8 times.
+//! one array made 3 to 5 % more there and no more elsewhere. Nodes of 128 bytes, with bounds as bytes, made a sixth to a quarter fewer in an office
+//! (docs/performance.md): rays wait for arithmetic and for guesses, not for nodes. Eight rays in turn, a step each, what they need next fetched
+//! meanwhile: single rays 1.3 to 1.9 times as fast there, but 64 from each point, which are what there is to trace, 0.8 times.
 
 use crate::Hit;
 use crate::build::MAX_DEPTH;
@@ -27,7 +27,7 @@ pub(crate) trait Lanes {
     /// Bits of the boxes met no later than `limit`, which has been widened, and the distances of all.
     fn boxes(&self, node: &Node, limit: f32) -> (u32, Self::Eight);
 
-    fn distances(eight: Self::Eight) -> [f32; WIDTH];
+    fn distances(&self, eight: Self::Eight) -> [f32; WIDTH];
 
     /// Shows `found` the triangles that are hit with a key of at most `limit`; it ends the search by `true`.
     fn triangles(&self, block: &Block, axes: [usize; 3], limit: f32, found: impl FnMut(Candidate) -> bool) -> bool;
@@ -125,7 +125,7 @@ pub(crate) fn closest<L: Lanes>(
             let node = &tree.nodes[child.index()];
             let (mut mask, near) = lanes.boxes(node, limit);
             if mask != 0 {
-                let distance = L::distances(near);
+                let distance = lanes.distances(near);
                 let entry = |slot: usize| u64::from(distance[slot].to_bits()) << 32 | u64::from(node.child[slot].0);
                 let slot = mask.trailing_zeros() as usize % WIDTH;
                 mask &= mask - 1;

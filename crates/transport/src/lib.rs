@@ -30,7 +30,7 @@ pub mod view_factors;
 pub mod zones;
 
 pub use block::FileError;
-pub use direct::{Columns, Halves, Shadowing, Variation};
+pub use direct::{Columns, HalvedLight, Shadowing, Variation};
 pub use exposure::Exposure;
 pub use form_factors::{FormFactorMethod, FormFactorOptions, FormFactors, UnknownFormFactorMethod};
 pub use gather::Gather;

@@ -88,8 +88,7 @@ impl Panel {
 /// Cosine of what lies in one plane, at least.
 const FLAT: f64 = 1.0 - 1e-12;
 
-/// Lights with more triangles than this have them in a tree: for a ray or two it would cost more than these to evaluate the polygon factor
-/// of each.
+/// Lights with more triangles than this have them in a tree, too: to evaluate the polygon factor of each takes longer than a few rays.
 pub(crate) const MOST_EXACT_PIECES: usize = 64;
 
 /// Lights of more panels than this are looked at by rays alone: a place would look for blockers as often.

@@ -42,7 +42,7 @@ pub fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, n: u32, sa
     (arriving.map(|e| f64::from(e) * cosine * clear as f64 / f64::from(n)), outcome)
 }
 
-/// Unshadowed irradiance of a place from a light of few triangles by their form factors; these come back as the luminance of
+/// Unshadowed irradiance of a place from triangles by their form factors; these come back as the luminance of
 /// each one's part.
 pub fn unshadowed(pieces: &[Piece], place: &Place, factors: &mut [f64]) -> [f64; 3] {
     let mut sum = [0f64; 3];
@@ -60,9 +60,9 @@ pub fn unshadowed(pieces: &[Piece], place: &Place, factors: &mut [f64]) -> [f64;
 /// `n` samples from number `first` of a sequence on.
 pub type Samples<'s> = (&'s Sequence, u32, u32);
 
-/// Irradiance of a place from a light of few triangles: analytic value `here` times visible share; what became of
+/// Irradiance of a place from a light whose factors are known: analytic value `here` times visible share; what became of
 /// the rays.
-pub fn from_few(
+pub fn from_known(
     (pieces, factors): (&[Piece], &[f64]),
     here: [f64; 3],
     tracer: &Tracer,
@@ -296,6 +296,30 @@ fn emission_at(tracer: &Tracer, piece: &Piece, point: DVec3) -> Bands {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// By sums as one after the other: each piece as often as it gives light, those that give none never, wherever these stand.
+    #[test]
+    fn pieces_are_picked_by_sums_as_by_looking_at_each() {
+        let mut factors = vec![0.0; 40];
+        for (k, factor) in factors.iter_mut().enumerate().skip(3).step_by(3) {
+            *factor = 1.0 + k as f64;
+        }
+        assert!(factors[0] == 0.0 && factors[20] == 0.0 && factors[39] > 0.0);
+        for last in [39, 36] {
+            factors[last + 1..].fill(0.0);
+            let plain = Picks::new(&factors);
+            let mut summed = Picks::new(&factors);
+            summed.add_up();
+            for i in 0..=1000 {
+                let u = (f64::from(i) / 1000.0).min(1.0 - f64::EPSILON);
+                let ((k, x), (l, y)) = (plain.pick(u), summed.pick(u));
+                // Rounding may decide otherwise at the border of two pieces.
+                let is_same = k == l && (x - y).abs() < 1e-9;
+                assert!(is_same || x.min(y) < 1e-9 && x.max(y) > 1.0 - 1e-8, "{u}: {k}, {x} and {l}, {y}");
+                assert!(factors[k] > 0.0 && factors[l] > 0.0);
+            }
+        }
+    }
     use radiosity_scene::{Material, Mesh, Scene, Side};
 
     /// What samples have in common changes none of them: many at once are those that are taken one by one.
@@ -319,7 +343,7 @@ mod tests {
         let place = Place { point: p(0.1, 0.2), normal: DVec3::Y, triangle: 0 };
         let sequence = Sequence::new(5, 0);
         let some = |first: u32, n: u32| {
-            from_few((&pieces, &factors), here, &tracer, &place, (&sequence, first, n), (u32::MAX, 3)).0
+            from_known((&pieces, &factors), here, &tracer, &place, (&sequence, first, n), (u32::MAX, 3)).0
         };
         let n = 16;
         let mut alone = [0.0; 3];

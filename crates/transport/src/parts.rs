@@ -2,7 +2,7 @@
 
 use crate::Luminaires;
 use crate::luminaires::{Light, Panel, Piece, PieceTree};
-use crate::one_light::{DARK, LIT, Samples, from_few, from_many, from_point, luminance_of, unshadowed};
+use crate::one_light::{DARK, LIT, Samples, from_known, from_many, from_point, luminance_of, unshadowed};
 use crate::polygon::Four;
 use radiosity_scene::{PointLight, luminance};
 use radiosity_trace::{Place, Tracer};
@@ -23,15 +23,16 @@ pub struct Part<'l> {
 enum What<'l> {
     Point(&'l PointLight),
     /// Triangles whose factors are known: where these begin, and what the triangles give together, lux per band.
-    Few(&'l [Piece], usize, [f64; 3]),
+    Known(&'l [Piece], usize, [f64; 3]),
     /// Triangles of a light below a node of its tree.
     Many(&'l [Piece], &'l PieceTree, u32),
 }
 
-/// Up to so many triangles of lights with a tree, for each shadow ray of a place, have their factors evaluated there: what is fully lit has no noise
-/// then. That takes as long as some four rays, half of it where half of the triangles look away. Of a bulb of 960 triangles a picture within three
-/// seconds is 1.8 % off, with 16 for each ray 3.6 % with stains all over; where a thousand lamps hang side by side it takes an eighth longer.
-const FOR_A_RAY: usize = 64;
+/// Up to so many triangles of lights with a tree, for each shadow ray that a place would have if anything were in the way, have their factors evaluated
+/// there: what is fully lit has no noise then. 64 factors take as long as some four rays, half of that where half of the triangles look away. Of a
+/// room with a bulb of 960 triangles a picture within three seconds is 1.8 % off; with 16 for each ray, where these are left to rays there, 3.6 %, with stains
+/// all over. Where a thousand lamps hang side by side it takes an eighth longer.
+pub(crate) const FOR_A_RAY: usize = 64;
 
 /// A place that sees less than this share of a lamp is asked whether it is buried, as one is of whose rays none came through: beneath a
 /// lid with a gap of a tenth of a millimetre some light comes in.
@@ -57,9 +58,9 @@ pub struct Parts<'l> {
 }
 
 impl<'l> Parts<'l> {
-    /// Those of all lights, at another place that is to have so many shadow rays.
+    /// Those of all lights, at another place that would have so many shadow rays if anything were in the way.
     pub fn find(&mut self, luminaires: &'l Luminaires, place: &Place, rays: u32) {
-        let is_worth_it = luminaires.many <= FOR_A_RAY * rays as usize;
+        let sums_all = luminaires.many <= FOR_A_RAY * rays as usize;
         self.clear();
         for four in &luminaires.few {
             self.factors.extend(four.seen_from(place.point, place.normal));
@@ -68,10 +69,10 @@ impl<'l> Parts<'l> {
         for (number, light) in luminaires.lights.iter().enumerate() {
             match light {
                 Light::Area { pieces, tree: None, .. } => {
-                    self.add_few(number, pieces, first, place);
+                    self.add_known(number, pieces, first, place);
                     first += pieces.len();
                 }
-                Light::Area { pieces, fours, .. } if is_worth_it => self.add_seen(number, pieces, fours, place),
+                Light::Area { pieces, fours, .. } if sums_all => self.add_seen(number, pieces, fours, place),
                 _ => self.add(number, light, place),
             }
         }
@@ -120,13 +121,13 @@ impl<'l> Parts<'l> {
         for four in fours {
             self.factors.extend(four.seen_from(place.point, place.normal));
         }
-        self.add_few(number, pieces, first, place);
+        self.add_known(number, pieces, first, place);
     }
 
     /// Adds triangles whose form factors are known from `first` on.
-    fn add_few(&mut self, number: usize, pieces: &'l [Piece], first: usize, place: &Place) {
+    fn add_known(&mut self, number: usize, pieces: &'l [Piece], first: usize, place: &Place) {
         let here = unshadowed(pieces, place, &mut self.factors[first..][..pieces.len()]);
-        self.push(number, luminance_of(here), What::Few(pieces, first, here));
+        self.push(number, luminance_of(here), What::Known(pieces, first, here));
     }
 
     fn push(&mut self, light: usize, weight: f64, what: What<'l>) {
@@ -175,7 +176,7 @@ impl<'l> Parts<'l> {
         let expected = |weight: f64| expected((*count, *total), weight, rays);
         let mut outcome = 0;
         list.retain_mut(|part| {
-            let What::Few(pieces, first, here) = &mut part.what else { return true };
+            let What::Known(pieces, first, here) = &mut part.what else { return true };
             let panels = &luminaires.panels[part.light];
             let (mut is_left, mut is_settled) = (panels.is_empty(), false);
             for (k, panel) in panels.iter().enumerate() {
@@ -218,9 +219,9 @@ impl<'l> Parts<'l> {
     ) -> ([f64; 3], u8) {
         match part.what {
             What::Point(light) => from_point(light, tracer, place, samples.2, salt),
-            What::Few(pieces, first, here) => {
+            What::Known(pieces, first, here) => {
                 let factors = &self.factors[first..][..pieces.len()];
-                from_few((pieces, factors), here, tracer, place, samples, (ratio, salt))
+                from_known((pieces, factors), here, tracer, place, samples, (ratio, salt))
             }
             What::Many(pieces, tree, node) => from_many((pieces, tree, node), tracer, place, samples, salt),
         }

@@ -164,27 +164,31 @@ fn lamps_of_many_triangles_are_exact_in_full_light_and_unbiased_in_penumbrae() {
     }
 }
 
-/// Halves are estimates of the same light, each as good as all that has its rays, and independent of one another; what is known without
+/// HalvedLight are estimates of the same light, each as good as all that has its rays, and independent of one another; what is known without
 /// rays is known in both.
 #[test]
 fn halves_are_independent() {
     let x = 0.07;
     let truth = exact(&on_the_floor(x, 0.1), (0.0, 0.2 - x));
     let places: Vec<Place> = (0..4000).map(|i| on_the_floor(x, 0.1 + 1e-7 * f64::from(i))).collect();
-    let halves = |scene: &Scene| -> Vec<Halves> {
+    let halves = |scene: &Scene| -> Vec<HalvedLight> {
         let (mesh, _, _, luminaires) = prepared(scene, 10.0);
         let receivers = PointReceivers { places: &places, shaded: &[], salt: 0 };
         let shadowing = Shadowing { places: 1, rays: 16 };
         luminaires.halves(&Tracer::new(scene, &mesh), &receivers, &shadowing, &()).unwrap()
     };
     let found = halves(&fine_lamp(true));
-    let off = |half: &Halves, k: usize| f64::from(half.light[k][1]) - truth;
-    let sum = |f: &dyn Fn(&Halves) -> f64| found.iter().map(f).sum::<f64>() / found.len() as f64;
-    let variance = [0, 1].map(|k| sum(&|half| off(half, k).powi(2)));
-    let covariance = sum(&|half| off(half, 0) * off(half, 1));
+    let off = |half: &HalvedLight, k: usize| f64::from(half.light[k][1]) - truth;
+    let mean = |f: &dyn Fn(&HalvedLight) -> f64| found.iter().map(f).sum::<f64>() / found.len() as f64;
+    let variance = [0, 1].map(|k| mean(&|half| off(half, k).powi(2)));
+    let covariance = mean(&|half| off(half, 0) * off(half, 1));
+    let alone = illuminance(&fine_lamp(true), &places, 16);
+    let of_all = alone.iter().map(|e| (e - truth).powi(2)).sum::<f64>() / alone.len() as f64;
     for k in [0, 1] {
         let error = (variance[k] / found.len() as f64).sqrt();
-        assert!(sum(&|half| off(half, k)).abs() < 5.0 * error + 2e-3 * truth, "half {k}");
+        // Five standard errors, here and below: a false alarm once in two million.
+        assert!(mean(&|half| off(half, k)).abs() < 5.0 * error + 2e-3 * truth, "half {k}");
+        assert!((variance[k] / of_all - 1.0).abs() < 0.2, "half {k}: {} and {of_all}", variance[k]);
     }
     assert!(variance[0] > 0.0 && !found.iter().any(|half| half.is_exact));
     assert!(covariance.abs() < 0.1 * (variance[0] * variance[1]).sqrt(), "{covariance} of {variance:?}");
@@ -192,6 +196,22 @@ fn halves_are_independent() {
         assert!(half.is_exact && half.light[0] == half.light[1]);
         assert!(off(&half, 0).abs() < 1e-4 * truth);
     }
+
+    // Elements have other places in either half: both are near the mean over them, and few are the same.
+    let scene = lamps(1, true);
+    let (mesh, elements, _, luminaires) = prepared(&scene, 0.5);
+    let (tracer, exposure) = (Tracer::new(&scene, &mesh), crate::Exposure::default());
+    let receivers = crate::ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+    let [some, many] = [16, 1024].map(|places| Shadowing { places, rays: 4 });
+    let found = luminaires.halves(&tracer, &receivers, &some, &()).unwrap();
+    let all = luminaires.columns(&tracer, &receivers, &many, &()).unwrap();
+    let peak = (0..elements.len()).map(|e| all.mean(e)[1]).fold(0.0, f32::max);
+    for (e, half) in found.iter().enumerate() {
+        let is_near = |light: Bands| (light[1] - all.mean(e)[1]).abs() < 0.1 * peak;
+        assert!(half.light.iter().all(|light| is_near(*light)), "{e}: {half:?} for {:?}", all.mean(e));
+    }
+    let lit: Vec<&HalvedLight> = found.iter().filter(|half| !half.is_exact && half.light[0] != [0.0; 3]).collect();
+    assert!(lit.len() > 20 && lit.iter().filter(|half| half.light[0] == half.light[1]).count() < lit.len() / 10);
 }
 
 /// To a light without area there is one line of sight, which a ray tells exactly, behind a blocker and beside it; unless something
@@ -502,6 +522,7 @@ fn many_lamps_are_unbiased() {
     }
     let (mesh, _, _, luminaires) = prepared(&scene, 10.0);
     let tracer = Tracer::new(&scene, &mesh);
+    assert!(luminaires.many > crate::parts::FOR_A_RAY * 12);
     for [x, y] in [[21.0, 21.0], [20.0, 7.0], [0.1, 39.0]] {
         let at = on_the_floor(x, y);
         let of_lamp = |i: u32, j: u32| {
