@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct HalvedLight {
     /// Lux per band.
     pub light: [Bands; 2],
-    /// Whether it is known without any chance ([`Columns::is_exact`]), so that the halves are the same.
+    /// Whether it is known without any chance ([`Columns::is_exact`](crate::Columns::is_exact)), so that the halves are the same.
     pub is_exact: bool,
 }
 
