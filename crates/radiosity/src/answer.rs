@@ -7,7 +7,7 @@ use glam::DVec2;
 use radiosity_scene::elements::ElementId;
 use radiosity_scene::{Bands, Side};
 use radiosity_trace::Place;
-use radiosity_transport::{HalvedLight, PointReceivers, Receivers, Shadowing};
+use radiosity_transport::{HalvedLight, PointReceivers, Receivers, Shadowing, Site};
 use radiosity_view::Field;
 use rayon::prelude::*;
 
@@ -43,6 +43,46 @@ pub struct Answer {
     pub direct: Vec<Bands>,
     /// Standard error of the gathered part, lux per band; zero for fields.
     pub standard_error: Vec<Bands>,
+}
+
+/// Places that receive light; each salt has rays of its own.
+pub(crate) struct Places {
+    at: Vec<Place>,
+    /// Whether any light may be hidden from each: whether any shadow ray of its cell was stopped. Of places in the open nothing is known.
+    shaded: Vec<bool>,
+    salt: u32,
+}
+
+impl Places {
+    fn points(&self) -> PointReceivers<'_> {
+        PointReceivers { places: &self.at, shaded: &self.shaded, salt: self.salt }
+    }
+}
+
+impl Receivers for Places {
+    fn len(&self) -> usize {
+        self.at.len()
+    }
+
+    fn site(&self, i: usize) -> Option<Site> {
+        self.points().site(i)
+    }
+
+    fn places(&self, i: usize, wanted: u32) -> u32 {
+        self.points().places(i, wanted)
+    }
+
+    fn rays(&self, i: usize, wanted: u32) -> u32 {
+        self.points().rays(i, wanted)
+    }
+
+    fn near(&self, i: usize) -> Option<f64> {
+        self.points().near(i)
+    }
+
+    fn seed(&self, i: usize) -> u32 {
+        self.points().seed(i)
+    }
 }
 
 /// Irradiance at stations whose direct light is known, by the field of indirect light.
@@ -142,23 +182,10 @@ impl Solution<'_> {
         salt: u32,
         monitor: &dyn Monitor,
     ) -> Result<Lit, Error> {
-        let shaded = self.shaded(places);
-        self.direct_of(&PointReceivers { places, shaded: &shaded, salt }, shadowing, monitor)
+        self.direct_of(&self.places(places.to_vec(), salt), shadowing, monitor)
     }
 
-    /// The same by two halves, of so many shadow rays each.
-    pub(crate) fn direct_halves_at(
-        &self,
-        places: &[Place],
-        shadowing: &Shadowing,
-        salt: u32,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<HalvedLight>, Error> {
-        let shaded = self.shaded(places);
-        self.direct_halves_of(&PointReceivers { places, shaded: &shaded, salt }, shadowing, monitor)
-    }
-
-    /// Direct irradiance of receivers by two halves.
+    /// Direct irradiance of receivers by two halves, of so many shadow rays each.
     pub(crate) fn direct_halves_of(
         &self,
         receivers: &impl Receivers,
@@ -183,16 +210,16 @@ impl Solution<'_> {
         Ok(Lit { light, is_exact })
     }
 
-    /// Whether any light may be hidden from each place: whether any shadow ray of its cell was stopped. Of places in the open
-    /// nothing is known.
-    fn shaded(&self, places: &[Place]) -> Vec<bool> {
+    /// Places as receivers.
+    pub(crate) fn places(&self, at: Vec<Place>, salt: u32) -> Places {
         let may_be_shaded = |place: &Place| {
             self.element_at(place).is_none_or(|element| {
                 let mut cell = self.elements.of_cell(self.elements.cell(element));
                 cell.any(|e| self.columns.is_shaded(e as usize))
             })
         };
-        places.par_iter().map(may_be_shaded).collect()
+        let shaded = at.par_iter().map(may_be_shaded).collect();
+        Places { at, shaded, salt }
     }
 
     /// Irradiance of the elements that places lie on, lux per band; 0 in the open.

@@ -1,6 +1,5 @@
 //! Light of elements that are finer than those that were solved for: means over their areas, by a final gather.
 
-use crate::allocation::Lit;
 use crate::measure::ENOUGH;
 use crate::points::{Asked, Light, Rays};
 use crate::{Error, Monitor, Solution};
@@ -8,7 +7,7 @@ use glam::DVec3;
 use radiosity_scene::{Bands, ElementId, Elements, Side};
 use radiosity_trace::sampling::hash;
 use radiosity_trace::{Place, Tracer};
-use radiosity_transport::{ElementReceivers, Exposure, HalvedLight, Receivers, Shadowing, Site};
+use radiosity_transport::{ElementReceivers, Exposure, Receivers, Shadowing, Site};
 use radiosity_view::Planes;
 
 /// Gather rays and shadow rays of an element to begin with, those of both halves. Neighbours share them.
@@ -57,11 +56,6 @@ impl Receivers for Part<'_> {
     }
 }
 
-/// So many rays of an element, by its places.
-fn shadowing(rays: usize) -> Shadowing {
-    Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 }
-}
-
 impl Asked for Open<'_> {
     const SHARES_DIRECT: bool = true;
     const MOST_NOISE: f64 = f64::INFINITY;
@@ -84,34 +78,16 @@ impl Asked for Open<'_> {
         Planes::new(self.all.mesh, self.all.elements)
     }
 
-    fn direct(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        (rays, salt): (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Lit, Error> {
-        solution.direct_of(&Part { open: self, own, salt }, &shadowing(rays), monitor)
+    type Some<'s>
+        = Part<'s>
+    where
+        Self: 's;
+    fn some<'s>(&'s self, _: &Solution, own: &'s [usize], salt: u32) -> Part<'s> {
+        Part { open: self, own, salt }
     }
 
-    fn direct_halves(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        (rays, salt): (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<HalvedLight>, Error> {
-        solution.direct_halves_of(&Part { open: self, own, salt }, &shadowing(rays), monitor)
-    }
-
-    fn gathered(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        (rays, salt): (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<HalvedLight>, Error> {
-        solution.halves_of(&Part { open: self, own, salt }, rays, monitor)
+    fn shadowing(rays: usize) -> Shadowing {
+        Shadowing { places: rays.div_ceil(FROM_EACH) as u32, rays: FROM_EACH as u32 }
     }
 }
 

@@ -2,11 +2,12 @@
 //! that were sent count, until another solution takes the place of the one that they looked up.
 
 use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, Lit, curb, growth, mean};
+use crate::answer::Places;
 use crate::{Error, Monitor, Solution};
 use glam::DVec3;
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
-use radiosity_transport::{HalvedLight, Shadowing};
+use radiosity_transport::{Receivers, Shadowing};
 use radiosity_view::{FLAT, Finding, Planes, Pooled};
 use std::time::Instant;
 
@@ -55,32 +56,14 @@ pub(crate) trait Asked {
     /// Planes on which they share.
     fn planes(&self, solution: &Solution) -> Planes;
 
-    /// Direct light of some of them. With so many rays each, and the salt that chooses them, here and below.
-    fn direct(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        rays: (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Lit, Error>;
+    /// Some of them as receivers; each salt has rays of its own.
+    type Some<'s>: Receivers
+    where
+        Self: 's;
+    fn some<'s>(&'s self, solution: &Solution, own: &'s [usize], salt: u32) -> Self::Some<'s>;
 
-    /// The same as two halves tell it, of so many rays each.
-    fn direct_halves(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        rays: (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<HalvedLight>, Error>;
-
-    /// What some of them gather, as two halves of the rays tell it.
-    fn gathered(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        rays: (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<HalvedLight>, Error>;
+    /// So many shadow rays of a receiver, by its places.
+    fn shadowing(rays: usize) -> Shadowing;
 }
 
 /// Points.
@@ -105,39 +88,17 @@ impl Asked for &[Place] {
         Planes::new(solution.tracer().mesh, &solution.elements)
     }
 
-    fn direct(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        (rays, salt): (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Lit, Error> {
-        solution.direct_by(&of(self, own), &shadowing(rays), salt, monitor)
+    type Some<'s>
+        = Places
+    where
+        Self: 's;
+    fn some<'s>(&'s self, solution: &Solution, own: &'s [usize], salt: u32) -> Places {
+        solution.places(own.iter().map(|i| self[*i]).collect(), salt)
     }
 
-    fn direct_halves(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        (rays, salt): (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<HalvedLight>, Error> {
-        solution.direct_halves_at(&of(self, own), &shadowing(rays), salt, monitor)
+    fn shadowing(rays: usize) -> Shadowing {
+        shadowing(rays)
     }
-
-    fn gathered(
-        &self,
-        solution: &Solution,
-        own: &[usize],
-        (rays, salt): (usize, u32),
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<HalvedLight>, Error> {
-        solution.halves_at(&of(self, own), rays, salt, monitor)
-    }
-}
-
-fn of(places: &[Place], own: &[usize]) -> Vec<Place> {
-    own.iter().map(|i| places[*i]).collect()
 }
 
 /// Light of receivers, and what it was found with.
@@ -173,10 +134,11 @@ impl<A: Asked> Light<A> {
     pub fn begin(&mut self, solution: &Solution, [gather, shadow]: Rays, monitor: &dyn Monitor) -> Result<(), Error> {
         let began = Instant::now();
         let all: Vec<usize> = (0..self.asked.len()).collect();
-        let halves = self.asked.direct_halves(solution, &all, (shadow / 2, self.sets + 1), monitor)?;
+        let (shadowing, set) = (A::shadowing(shadow / 2), self.sets + 1);
+        let halves = solution.direct_halves_of(&self.asked.some(solution, &all, set), &shadowing, monitor)?;
         self.direct = Found::of_halves(&halves, shadow as u32, evened);
-        self.sets += 2;
-        let halves = self.asked.gathered(solution, &all, (gather, self.sets), monitor)?;
+        self.sets += 3;
+        let halves = solution.halves_of(&self.asked.some(solution, &all, self.sets), gather, monitor)?;
         self.gathered = Found::of_halves(&halves, gather as u32, evened);
         self.share();
         self.seconds = began.elapsed().as_secs_f64();
@@ -201,7 +163,7 @@ impl<A: Asked> Light<A> {
         }
         self.sets += 1;
         let all: Vec<usize> = (0..self.asked.len()).collect();
-        let halves = self.asked.gathered(solution, &all, (more, self.sets), monitor)?;
+        let halves = solution.halves_of(&self.asked.some(solution, &all, self.sets), more, monitor)?;
         self.gathered.join(Found::of_halves(&halves, more as u32, evened));
         self.share();
         self.seconds += began.elapsed().as_secs_f64();
@@ -229,13 +191,13 @@ impl<A: Asked> Light<A> {
         let spread = |pooled: &[Pooled]| -> Vec<f32> { pooled.iter().map(|p| p.spread).collect() };
         let mut times = growth(&spread(&self.lit), &weights, &ceilings, of_direct, for_direct);
         curb(&mut times, most);
-        let more_direct = self
-            .direct
-            .grow((&times, for_direct), |own, rays| asked.direct(solution, own, (rays as usize, set), monitor))?;
+        let more_direct = self.direct.grow((&times, for_direct), |own, rays| {
+            solution.direct_of(&asked.some(solution, own, set), &A::shadowing(rays as usize), monitor)
+        })?;
         let mut times = growth(&spread(&self.pooled), &weights, &ceilings, of_gathered, for_gathered);
         curb(&mut times, most);
         let more_gathered = self.gathered.grow((&times, for_gathered), |own, rays| {
-            let halves = asked.gathered(solution, own, (rays as usize, set), monitor)?;
+            let halves = solution.halves_of(&asked.some(solution, own, set), rays as usize, monitor)?;
             Ok(Lit::sampled(halves.into_iter().map(|half| mean(half.light)).collect()))
         })?;
         self.share();

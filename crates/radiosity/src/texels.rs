@@ -99,7 +99,7 @@ pub(crate) fn light(
 
     let first = gather_rays(error).min(FIRST_GATHERED);
     let shadow = rays_for(error, FIRST_SHADOW, LEAST_SHADOW, MOST_SHADOW);
-    let halves = solution.direct_halves_at(&places, &shadowing(shadow / 2), 1, monitor)?;
+    let halves = solution.direct_halves_of(&solution.places(places.clone(), 1), &shadowing(shadow / 2), monitor)?;
     let mut direct = Found::of_halves(&halves, shadow as u32, evened);
     let (mut gathered, mut indirect) = shared(first)?;
     let area = sheet.atlas.areas(sheet.texels);

@@ -2,7 +2,7 @@
 
 use crate::intersect::Prepared;
 use crate::tree::{Block, LANES, Node, Tree, WIDTH};
-use crate::walk::{self, Candidate, Lanes};
+use crate::walk::{self, Candidate, Candidates, Lanes};
 use crate::{Hit, Ray};
 use std::arch::x86_64::*;
 
@@ -66,7 +66,7 @@ impl Avx2 {
     /// Shows `found` the triangles that are hit with a key of at most `limit`; it ends the search by `true`.
     #[inline]
     #[target_feature(enable = "avx2,fma")]
-    fn hit(&self, block: &Block, axes: [usize; 3], limit: f32, mut found: impl FnMut(Candidate) -> bool) -> bool {
+    fn hit(&self, block: &Block, axes: [usize; 3], limit: f32, found: impl FnMut(Candidate) -> bool) -> bool {
         let [kx, ky, kz] = axes;
         let rows: *const f32 = block.corner.as_ptr().cast();
         // SAFETY: the axes are a permutation of 0, 1, 2, so the rows lie within the nine of four numbers.
@@ -103,30 +103,21 @@ impl Avx2 {
         // SAFETY: four indices lie there.
         let triangle = unsafe { _mm_loadu_si128(block.triangle.as_ptr().cast()) };
         let skipped = _mm_castsi128_ps(_mm_cmpeq_epi32(triangle, self.skip));
-        let mut mask = inside & _mm_movemask_ps(_mm_andnot_ps(skipped, within)) as u32;
+        let mask = inside & _mm_movemask_ps(_mm_andnot_ps(skipped, within)) as u32;
         if mask == 0 {
             return false;
         }
 
-        let (mut ts, mut keys) = ([0.0f32; LANES], [0.0f32; LANES]);
-        let (mut vs, mut ws, mut dets) = ([0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES]);
+        let mut hits = Candidates::default();
         // SAFETY: each array has room for its four numbers.
         unsafe {
-            _mm_storeu_ps(ts.as_mut_ptr(), t);
-            _mm_storeu_ps(keys.as_mut_ptr(), key);
-            _mm256_storeu_pd(vs.as_mut_ptr(), v);
-            _mm256_storeu_pd(ws.as_mut_ptr(), w);
-            _mm256_storeu_pd(dets.as_mut_ptr(), det);
+            _mm_storeu_ps(hits.t.as_mut_ptr(), t);
+            _mm_storeu_ps(hits.key.as_mut_ptr(), key);
+            _mm256_storeu_pd(hits.v.as_mut_ptr(), v);
+            _mm256_storeu_pd(hits.w.as_mut_ptr(), w);
+            _mm256_storeu_pd(hits.det.as_mut_ptr(), det);
         }
-        while mask != 0 {
-            let i = mask.trailing_zeros() as usize % LANES;
-            mask &= mask - 1;
-            let (key, t, triangle) = (keys[i], ts[i], block.triangle[i]);
-            if found(Candidate { key, t, triangle, v: vs[i], w: ws[i], det: dets[i] }) {
-                return true;
-            }
-        }
-        false
+        hits.show(block, mask, found)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::intersect::Prepared;
 use crate::tree::{Block, LANES, Node, Tree, WIDTH};
-use crate::walk::{self, Candidate, Lanes};
+use crate::walk::{self, Candidate, Candidates, Lanes};
 use crate::{Hit, Ray};
 use std::arch::aarch64::*;
 
@@ -77,7 +77,7 @@ impl Neon {
     /// Shows `found` the triangles that are hit with a key of at most `limit`; it ends the search by `true`.
     #[inline]
     #[target_feature(enable = "neon")]
-    fn hit(&self, block: &Block, axes: [usize; 3], limit: f32, mut found: impl FnMut(Candidate) -> bool) -> bool {
+    fn hit(&self, block: &Block, axes: [usize; 3], limit: f32, found: impl FnMut(Candidate) -> bool) -> bool {
         let [kx, ky, kz] = axes;
         let rows: *const f32 = block.corner.as_ptr().cast();
         // SAFETY: the axes are a permutation of 0, 1, 2, so the rows lie within the nine of four numbers.
@@ -104,32 +104,23 @@ impl Neon {
         );
         // SAFETY: four indices lie there.
         let triangle = unsafe { vld1q_u32(block.triangle.as_ptr()) };
-        let mut mask = vaddvq_u32(vandq_u32(vbicq_u32(within, vceqq_u32(triangle, self.skip)), self.bits[0]));
+        let mask = vaddvq_u32(vandq_u32(vbicq_u32(within, vceqq_u32(triangle, self.skip)), self.bits[0]));
         if mask == 0 {
             return false;
         }
 
-        let (mut ts, mut keys) = ([0.0f32; LANES], [0.0f32; LANES]);
-        let (mut vs, mut ws, mut dets) = ([0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES]);
+        let mut hits = Candidates::default();
         // SAFETY: each array has room for its four numbers.
         unsafe {
-            vst1q_f32(ts.as_mut_ptr(), t);
-            vst1q_f32(keys.as_mut_ptr(), key);
+            vst1q_f32(hits.t.as_mut_ptr(), t);
+            vst1q_f32(hits.key.as_mut_ptr(), key);
             for (edges, at) in [(&first, 0), (&second, 2)] {
-                vst1q_f64(vs.as_mut_ptr().add(at), edges.v);
-                vst1q_f64(ws.as_mut_ptr().add(at), edges.w);
-                vst1q_f64(dets.as_mut_ptr().add(at), edges.det);
+                vst1q_f64(hits.v.as_mut_ptr().add(at), edges.v);
+                vst1q_f64(hits.w.as_mut_ptr().add(at), edges.w);
+                vst1q_f64(hits.det.as_mut_ptr().add(at), edges.det);
             }
         }
-        while mask != 0 {
-            let i = mask.trailing_zeros() as usize % LANES;
-            mask &= mask - 1;
-            let (key, t, triangle) = (keys[i], ts[i], block.triangle[i]);
-            if found(Candidate { key, t, triangle, v: vs[i], w: ws[i], det: dets[i] }) {
-                return true;
-            }
-        }
-        false
+        hits.show(block, mask, found)
     }
 }
 

@@ -16,7 +16,7 @@
 use crate::Hit;
 use crate::build::MAX_DEPTH;
 use crate::intersect::Prepared;
-use crate::tree::{Block, Child, Node, Tree, WIDTH};
+use crate::tree::{Block, Child, LANES, Node, Tree, WIDTH};
 use std::mem::MaybeUninit;
 
 /// A ray in every lane of a processor's registers.
@@ -92,6 +92,33 @@ impl Candidate {
     fn hit(&self) -> Hit {
         let Candidate { t, triangle, v, w, det, .. } = *self;
         Hit { t, triangle, u: (v / det) as f32, v: (w / det) as f32, back: det < 0.0 }
+    }
+}
+
+/// What a ray found of the triangles of a block, lane by lane.
+#[derive(Default)]
+pub(crate) struct Candidates {
+    pub key: [f32; LANES],
+    pub t: [f32; LANES],
+    pub v: [f64; LANES],
+    pub w: [f64; LANES],
+    pub det: [f64; LANES],
+}
+
+impl Candidates {
+    /// Shows `found` those that are hits, as bits of a mask; it ends the search by `true`.
+    #[inline(always)]
+    pub fn show(&self, block: &Block, mut mask: u32, mut found: impl FnMut(Candidate) -> bool) -> bool {
+        let Candidates { key, t, v, w, det } = self;
+        while mask != 0 {
+            let i = mask.trailing_zeros() as usize % LANES;
+            mask &= mask - 1;
+            let triangle = block.triangle[i];
+            if found(Candidate { key: key[i], t: t[i], triangle, v: v[i], w: w[i], det: det[i] }) {
+                return true;
+            }
+        }
+        false
     }
 }
 
