@@ -10,7 +10,8 @@ const SAME = 1e-5;
 export class Ahead<T extends { id: number }> {
   /** As the server said last. */
   private said = new Map<number, T>();
-  private own = new Map<number, { change: Partial<T>; since: number }>();
+  /** All that was changed and not said yet, oldest first, each with what was changed before it. */
+  private own = new Map<number, { changes: Partial<T>[]; since: number }>();
   /** Shown as this page had changed them, until the server says how they are. */
   private loose = new Set<number>();
   /** The largest number shown. */
@@ -23,14 +24,19 @@ export class Ahead<T extends { id: number }> {
   hear(thing: T): void {
     this.said.set(thing.id, thing);
     this.loose.delete(thing.id);
-    const own = this.own.get(thing.id);
-    if (own && agrees(thing, own.change)) this.own.delete(thing.id);
+    // What was changed to and fro is said twice: the first time is not the last.
+    const changes = this.own.get(thing.id)?.changes;
+    const confirmed = changes?.findIndex((change) => agrees(thing, change)) ?? -1;
+    changes?.splice(0, confirmed + 1);
+    if (changes?.length === 0) this.own.delete(thing.id);
     this.put(thing.id);
   }
 
   /** This page has changed one. */
   change(id: number, change: Partial<T>): void {
-    this.own.set(id, { change: { ...this.own.get(id)?.change, ...change }, since: performance.now() });
+    const changes = this.own.get(id)?.changes ?? [];
+    changes.push({ ...changes.at(-1), ...change });
+    this.own.set(id, { changes, since: performance.now() });
     this.put(id);
   }
 
@@ -60,7 +66,7 @@ export class Ahead<T extends { id: number }> {
   private put(id: number): void {
     const said = this.said.get(id);
     if (!said) return;
-    const thing = { ...said, ...this.own.get(id)?.change };
+    const thing = { ...said, ...this.own.get(id)?.changes.at(-1) };
     // What was changed last comes last to a page that is opened then; lists are by number all the same.
     const later = this.shown.has(id) || id > this.last ? [] : [...this.shown].filter(([other]) => other > id);
     for (const [other] of later) this.shown.delete(other);

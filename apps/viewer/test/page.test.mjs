@@ -708,6 +708,29 @@ test('what is not as it was asked for is told until the next number, and is not 
   await page.context().close();
 });
 
+test('what is changed to and fro stays as it was changed last, whatever is said of it meanwhile', async () => {
+  const page = await pages.open(program.url);
+  await done(page);
+  const shown = await page.evaluate(() => {
+    const { lights, lightsAhead } = window.radiosity.app;
+    const [light] = lights.values();
+    const dimming = [];
+    const look = (act) => { act(); dimming.push(lights.get(light.id).dimming); };
+    const change = (dimming) => look(() => lightsAhead.change(light.id, { dimming }));
+    const hear = (dimming) => look(() => lightsAhead.hear({ ...light, dimming }));
+    [2, 0.5, 2].forEach(change);
+    [2, 0.5, 2, 0.7].forEach(hear);
+    // Of a drag only the last place may be said.
+    [3, 4, 5].forEach(change);
+    [5, 0.7].forEach(hear);
+    lightsAhead.hear(light);
+    return dimming;
+  });
+  assert.deepEqual(shown, [2, 0.5, 2, 2, 2, 2, 0.7, 3, 4, 5, 5, 0.7]);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
 test('what is written into a number that changed under the cursor replaces it', async () => {
   const page = await pages.open(program.url);
   await done(page);

@@ -297,6 +297,14 @@ fn linear(x: f64, a: f64, b: f64) -> f64 {
     (x * (a + b) / (a + root)).min(1.0)
 }
 
+/// Solid angle of a triangle whose corners are given relative to the eye, less than zero where they run counter-clockwise as
+/// seen from there (Van Oosterom and Strackee 1983).
+pub(crate) fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+    let (x, y, z) = (a.length(), b.length(), c.length());
+    let below = x * y * z + a.dot(b) * z + a.dot(c) * y + b.dot(c) * x;
+    2.0 * a.dot(b.cross(c)).atan2(below)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,7 +5,7 @@
 //! plane of a face crosses, these faces and edges are the same.
 
 use super::panel::Panel;
-use super::solid::{Obstacles, is_outside};
+use super::solid::{Obstacles, Outside, Solid};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -35,11 +35,12 @@ impl Body {
     /// The bodies that the panels belong to, and which each does. A solid is taken as one where all of `from` is
     /// outside.
     pub fn of(Setting { panels, obstacles, touch, .. }: Setting, from: &[DVec3]) -> (Vec<Body>, Vec<u16>) {
+        let mut outside = Outside::new(obstacles, from, touch);
         let mut bodies: Vec<Body> = Vec::new();
         let mut body_of = Vec::with_capacity(panels.len());
         for (k, panel) in panels.iter().enumerate() {
             let body = match panel.solid {
-                Some(solid) if is_outside(solid, obstacles, from, touch) => Body::Solid(solid),
+                Some(solid) if obstacles.solids[solid as usize].is_convex && outside.of(solid) => Body::Solid(solid),
                 _ => Body::Panel(k as u16),
             };
             let known = bodies.iter().position(|b| *b == body).unwrap_or(bodies.len());
@@ -49,6 +50,22 @@ impl Body {
             body_of.push(known as u16);
         }
         (bodies, body_of)
+    }
+
+    /// Whether it is a round solid.
+    pub fn is_round(self, obstacles: Obstacles) -> bool {
+        matches!(self, Body::Solid(solid) if obstacles.solids[solid as usize].is_round())
+    }
+
+    /// Planes of its faces and edges, those of a panel from both sides.
+    pub fn planes(self, Setting { panels, obstacles, .. }: Setting) -> usize {
+        match self {
+            Body::Panel(k) => 2 + 2 * panels[k as usize].corners.len(),
+            Body::Solid(solid) => {
+                let Solid { faces, edges, .. } = &obstacles.solids[solid as usize];
+                faces.len() + edges.len()
+            }
+        }
     }
 
     /// Its faces.
@@ -71,6 +88,8 @@ pub struct Occluder {
     pub cuts: SmallVec<[(DVec3, f64); 3]>,
     /// Its outline, counter-clockwise as seen from the piece.
     pub edges: SmallVec<[Line; 6]>,
+    /// Whether it is a round solid.
+    pub is_round: bool,
 }
 
 impl Occluder {
@@ -127,20 +146,21 @@ impl Occluder {
             Line::new(if is_above { [p, q] } else { [q, p] })
         };
         let faces = SmallVec::from_iter([(side * panel.normal, side * panel.offset)]);
-        Occluder { faces, cuts: SmallVec::new(), edges: (0..n).map(edge).collect() }
+        Occluder { faces, edges: (0..n).map(edge).collect(), ..Occluder::default() }
     }
 
     /// A solid: its faces that look towards the place, and the edges where they meet the others.
     fn solid(solid: u32, obstacles: Obstacles, place: DVec3) -> Occluder {
         let solid = &obstacles.solids[solid as usize];
-        let panel = |face: u32| &obstacles.panels[face as usize];
-        let is_front = |face: u32| panel(face).height(place) > 0.0;
-        let faces = solid.faces.iter().filter(|face| is_front(**face));
-        let edges = solid.edges.iter().filter(|(face, beyond, _)| is_front(*face) && !is_front(*beyond));
+        let panels = || solid.faces.iter().map(|face| &obstacles.panels[*face as usize]);
+        let front: SmallVec<[bool; 64]> = panels().map(|panel| panel.height(place) > 0.0).collect();
+        let faces = panels().zip(&front).filter(|(_, is_front)| **is_front);
+        let edges = solid.edges.iter().filter(|(face, beyond, _)| front[*face as usize] && !front[*beyond as usize]);
         Occluder {
-            faces: faces.map(|face| (-panel(*face).normal, -panel(*face).offset)).collect(),
-            cuts: SmallVec::new(),
+            faces: faces.map(|(panel, _)| (-panel.normal, -panel.offset)).collect(),
             edges: edges.map(|(_, _, edge)| *edge).collect(),
+            is_round: solid.is_round(),
+            ..Occluder::default()
         }
     }
 }

@@ -174,13 +174,10 @@ impl<'a, 'b> Gallery<'a, 'b> {
         kept: &'b mut Kept,
     ) -> Option<Gallery<'a, 'b>> {
         let (bodies, body_of) = Body::of(setting, region);
-        if bodies.len() > FEW {
+        if bodies.len() > FEW || bodies.iter().any(|body| body.planes(setting) > PLANES) {
             return None;
         }
         let mut casters: Vec<Caster> = bodies.iter().map(|body| Caster::new(*body, setting, targets)).collect();
-        if casters.iter().any(|caster| caster.faces.len() + caster.edges.len() > PLANES) {
-            return None;
-        }
         for (k, body) in body_of.iter().enumerate() {
             casters[*body as usize].panels.push(k as u16);
         }
@@ -440,10 +437,7 @@ impl Caster {
             Body::Solid(solid) => {
                 body.faces(setting).for_each(|panel| face(panel, 1.0));
                 let solid = &setting.obstacles.solids[solid as usize];
-                let number = |face: u32| {
-                    solid.faces.iter().position(|f| *f == face).expect("faces of an edge are the solid's") as u8
-                };
-                edges.extend(solid.edges.iter().map(|(face, beyond, line)| (number(*face), number(*beyond), *line)));
+                edges.extend(solid.edges.iter().map(|(face, beyond, line)| (*face as u8, *beyond as u8, *line)));
             }
         }
         let (mut aside, mut cuts) = ([0; LEAF], [0; LEAF]);

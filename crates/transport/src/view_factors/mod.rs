@@ -35,7 +35,7 @@ pub use store::ViewFactors;
 use crate::row::GpuError;
 use crate::{Progress, Stopped};
 use cell::Sights;
-use cluster::Clusters;
+use cluster::{Clusters, LEAF};
 use gallery::Kept;
 pub(crate) use panel::{Planes, convex_pieces, panels, united};
 use part::Part;
@@ -135,8 +135,11 @@ pub(crate) const TOUCH: f64 = 5e-7;
 /// Bytes that a pair takes at most: stored once, and beside it once in each direction ([`ViewFactors::csr`]).
 const BYTES: usize = 3 * size_of::<(u32, f32, f64)>();
 
-/// Parts of a block: one task, and the pairs that share the first look at the panels.
+/// Parts of a block at most: one task, and the pairs that share the first look at the panels.
 const BLOCK: usize = 32;
+
+/// Blocks of few parts, at least: what is asked of some takes far longer than what is of others.
+const BLOCKS: usize = 24;
 
 /// The view factors between all facets of an enclosure.
 ///
@@ -156,7 +159,7 @@ pub fn view_factors(
     let solids = find_solids(&mut panels, touch);
     let parts = enclosure.facets.iter().enumerate().flat_map(|(i, facet)| Part::of(i as u32, facet)).collect();
     let clusters = Clusters::new(parts, &mut planes);
-    let blocks = clusters.blocks(BLOCK);
+    let blocks = clusters.blocks(BLOCK.min(clusters.parts.len() / BLOCKS).max(LEAF));
     let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let of_surfaces = enclosure.surface_areas();
     let too_much = FactorError::Memory { facets: enclosure.facets.len(), allowed: options.memory };

@@ -34,8 +34,8 @@ pub enum Look {
 /// Corners of an end at most: those of a box, or of a part with a corner cut off.
 const MOST: usize = if CORNERS + 1 > 8 { CORNERS + 1 } else { 8 };
 
-/// Corners whose heights above a plane are asked for. Nearly all ends have four, and loops whose length is known take a third
-/// of the time.
+/// Corners whose heights above a plane are asked for. Nearly all ends have four or three, and loops whose length is known take a
+/// third of the time.
 trait Corners: AsRef<[DVec3]> {
     type Heights: AsRef<[f64]>;
 
@@ -45,17 +45,16 @@ trait Corners: AsRef<[DVec3]> {
     fn inverse(heights: &[f64]) -> Self::Heights;
 }
 
-impl Corners for [DVec3; 4] {
-    type Heights = [f64; 4];
+impl<const N: usize> Corners for [DVec3; N] {
+    type Heights = [f64; N];
 
     #[inline(always)]
-    fn over(&self, (normal, offset): Plane) -> [f64; 4] {
-        let [a, b, c, d] = self;
-        [normal.dot(*a) - offset, normal.dot(*b) - offset, normal.dot(*c) - offset, normal.dot(*d) - offset]
+    fn over(&self, (normal, offset): Plane) -> [f64; N] {
+        self.map(|corner| normal.dot(corner) - offset)
     }
 
     #[inline(always)]
-    fn inverse(heights: &[f64]) -> [f64; 4] {
+    fn inverse(heights: &[f64]) -> [f64; N] {
         std::array::from_fn(|k| inverse(heights[k]))
     }
 }
@@ -70,6 +69,12 @@ impl Corners for [DVec3] {
     fn inverse(heights: &[f64]) -> SmallVec<[f64; MOST]> {
         heights.iter().map(|h| inverse(*h)).collect()
     }
+}
+
+/// Corners of known number.
+#[inline(always)]
+fn sized<const N: usize>(corners: &[DVec3]) -> &[DVec3; N] {
+    corners.try_into().expect("as many as they were matched for")
 }
 
 #[inline(always)]
@@ -115,8 +120,11 @@ impl<'a> Shaft<'a> {
     /// What `panel` does to the segments from one end to the other.
     pub fn stands(&mut self, panel: &Panel, look: Look) -> Stands {
         let [a, b] = self.ends;
-        let found = match (a.try_into(), b.try_into()) {
-            (Ok(a), Ok(b)) => self.by_edges::<[DVec3; 4]>(panel, a, b),
+        let found = match (a, b) {
+            ([_, _, _, _], [_, _, _, _]) => self.by_edges(panel, sized::<4>(a), sized::<4>(b)),
+            ([_, _, _, _], [_, _, _]) => self.by_edges(panel, sized::<4>(a), sized::<3>(b)),
+            ([_, _, _], [_, _, _, _]) => self.by_edges(panel, sized::<3>(a), sized::<4>(b)),
+            ([_, _, _], [_, _, _]) => self.by_edges(panel, sized::<3>(a), sized::<3>(b)),
             _ => self.by_edges(panel, a, b),
         };
         let is_open = found == Stands::Between && look == Look::Close && !self.is_hit(panel);
@@ -154,7 +162,7 @@ impl<'a> Shaft<'a> {
 
     /// What `panel` does, by its edges.
     #[inline(always)]
-    fn by_edges<C: Corners + ?Sized>(&self, panel: &Panel, a_end: &C, b_end: &C) -> Stands {
+    fn by_edges<A: Corners + ?Sized, B: Corners + ?Sized>(&self, panel: &Panel, a_end: &A, b_end: &B) -> Stands {
         let touch = self.touch;
         let plane = (panel.normal, panel.offset);
         let (a, b) = (a_end.over(plane), b_end.over(plane));
@@ -168,7 +176,7 @@ impl<'a> Shaft<'a> {
         let is_parted = (is_above(a_side) && is_below(b_side)) || (is_below(a_side) && is_above(b_side));
         let is_off = |[least, most]: [f64; 2]| least > touch || most < -touch;
         let are_off = is_parted && is_off(a_side) && is_off(b_side);
-        let (by_a, by_b) = (C::inverse(a), C::inverse(b));
+        let (by_a, by_b) = (A::inverse(a), B::inverse(b));
         let (by_a, by_b) = (by_a.as_ref(), by_b.as_ref());
         let mut all_within = true;
         for &rim in &panel.rims {
@@ -230,20 +238,21 @@ impl<'a> Shaft<'a> {
             _ => return false,
         };
         self.ends_done += 1;
-        match (own.try_into(), other.try_into()) {
-            (Ok(own), Ok(other)) => self.add_sides::<[DVec3; 4]>(own, other, normal),
+        match (own, other) {
+            (_, [_, _, _, _]) => self.add_sides(own, sized::<4>(other), normal),
+            (_, [_, _, _]) => self.add_sides(own, sized::<3>(other), normal),
             _ => self.add_sides(own, other, normal),
         }
         true
     }
 
     #[inline(always)]
-    fn add_sides<C: Corners + ?Sized>(&mut self, own: &C, other: &C, normal: DVec3) {
+    fn add_sides<C: Corners + ?Sized>(&mut self, own: &[DVec3], other: &C, normal: DVec3) {
         let touch = self.touch;
-        let offset = normal.dot(own.as_ref()[0]);
+        let offset = normal.dot(own[0]);
         let heights = other.over((normal, offset));
         let heights = heights.as_ref();
-        let (own, other) = (own.as_ref(), other.as_ref());
+        let other = other.as_ref();
         let (low, high) = (least(heights), most(heights));
         if low >= -touch {
             self.sides.push((-normal, -offset, touch));

@@ -22,6 +22,9 @@ const NARROW: f64 = 1e-5;
 /// Bodies in a list up to which their edges are held against each other's.
 const FEW: usize = 6;
 
+/// Faces that cross a polygon above which it is not cut by any: those of a mesh bend what is seen everywhere, and little each.
+const MESH: usize = 16;
+
 /// Pieces beyond which no more are cut.
 const MANY: usize = 64;
 
@@ -138,8 +141,10 @@ struct Side {
 pub struct Sides {
     /// A polygon that holds the region.
     region: Loop,
-    /// The planes of faces that cross it, each with its body.
+    /// The planes of faces that cross it, each with its body, but those of round solids.
     faces: SmallVec<[(u16, Plane); 8]>,
+    /// The round solids with faces whose planes cross it, in order.
+    round: Vec<u16>,
     /// The edges of the target.
     outline: SmallVec<[Line; 6]>,
     /// Those that were met.
@@ -154,10 +159,21 @@ impl Sides {
             .iter()
             .enumerate()
             .flat_map(|(k, body)| body.faces(setting).map(move |face| (k as u16, (face.normal, face.offset))));
-        let faces = faces.filter(|(_, plane)| is_crossed(region, *plane, 0.0)).collect();
+        let crossing = faces.filter(|(_, plane)| is_crossed(region, *plane, 0.0));
+        let is_round = |body: u16| bodies[body as usize].is_round(setting.obstacles);
+        let (of_round, faces): (Vec<_>, Vec<_>) = crossing.partition(|(body, _)| is_round(*body));
+        let mut round: Vec<u16> = of_round.into_iter().map(|(body, _)| body).collect();
+        round.dedup();
         let target = setting.target;
         let outline = (0..target.len()).map(|i| Line::new([target[i], target[(i + 1) % target.len()]])).collect();
-        Sides { region: region.into(), faces, outline, sides: Vec::new(), scratch: Default::default() }
+        Sides {
+            region: region.into(),
+            faces: faces.into(),
+            round,
+            outline,
+            sides: Vec::new(),
+            scratch: Default::default(),
+        }
     }
 
     /// The bodies as seen from a side, in their order.
@@ -175,13 +191,14 @@ impl Sides {
         Some(Piece { frame, side: self.side(from, size, bodies, setting) as u16 })
     }
 
-    /// Cuts a convex polygon of a size (m) in the region by the planes of faces that cross it, and then where edges of
-    /// bodies meet parallel ones.
+    /// Cuts a convex polygon of a size (m) in the region by the planes of faces that cross it, if they are not those of a mesh, and
+    /// then where edges of bodies meet parallel ones.
     pub fn cut(&mut self, (from, size): (&[DVec3], f64), bodies: &[Body], setting: Setting) -> SmallVec<[Piece; 4]> {
         let [mut pieces, mut parts] = std::mem::take(&mut self.scratch);
         pieces.push(from.into());
-        for (_, face) in &self.faces {
-            cut(&mut pieces, *face, size);
+        let crossing = self.faces.iter().filter(|(_, face)| is_crossed(from, *face, size));
+        if crossing.clone().count() <= MESH {
+            crossing.for_each(|(_, face)| cut(&mut pieces, *face, size));
         }
         let mut found = SmallVec::new();
         for piece in pieces.drain(..) {
@@ -214,8 +231,9 @@ impl Sides {
         if let Some(known) = self.sides.iter().position(|side| side.signs == signs) {
             return known;
         }
-        let is_varying =
+        let is_crossed =
             |body: usize| self.faces.iter().zip(&signs).any(|(face, sign)| face.0 as usize == body && *sign == 0);
+        let is_varying = |body: usize| self.round.binary_search(&(body as u16)).is_ok() || is_crossed(body);
         let seen = |(k, body): (usize, &Body)| match Occluder::new(*body, setting, centre) {
             _ if is_varying(k) => Seen::Varying,
             Some(occluder) => occluder.before(&self.region, setting).map_or(Seen::Nothing, Seen::As),

@@ -8,6 +8,7 @@
 use super::body::{Line, Occluder};
 use super::cell::bit;
 pub(crate) use crate::polygon::point_to_polygon_above as lambert;
+use crate::polygon::twice_area;
 use glam::DVec3;
 use smallvec::SmallVec;
 use std::ops::Range;
@@ -34,13 +35,20 @@ pub struct Shadows {
     planes: Vec<Plane>,
     /// The body of each, and its planes.
     of: Vec<(u16, Range<usize>)>,
+    /// Whether each is of a round solid.
+    round: Vec<bool>,
     /// What is cut, for shadows of shadows of shadows.
     clips: [Clip; FEW + 1],
 }
 
 impl Default for Shadows {
     fn default() -> Self {
-        Shadows { planes: Vec::new(), of: Vec::new(), clips: std::array::from_fn(|_| Clip::default()) }
+        Shadows {
+            planes: Vec::new(),
+            of: Vec::new(),
+            round: Vec::new(),
+            clips: std::array::from_fn(|_| Clip::default()),
+        }
     }
 }
 
@@ -84,26 +92,33 @@ impl Shadows {
         touch: f64,
     ) -> Sight {
         self.of.clear();
+        self.round.clear();
         self.planes.clear();
         for (body, occluder) in occluders {
             let start = self.planes.len();
             if throw(x, occluder, touch, &mut self.planes) {
                 self.of.push((body, start..self.planes.len()));
+                self.round.push(occluder.is_round);
             }
         }
-        let Shadows { planes, of, clips: [clip, clips @ ..] } = self;
+        let Shadows { planes, of, round, clips: [clip, clips @ ..] } = self;
         let (mut hidden_all, mut bodies, mut hash) = (0.0, 0u64, 0u64);
         let are_many = of.len() > FEW;
+        let mut many = Many::new();
         for (k, (body, range)) in of.iter().enumerate() {
             match within(target, &planes[range.clone()], clip) {
                 Within::None => {}
                 Within::All => return Sight::Nothing(*body),
-                Within::Part(how) => {
+                Within::Part { cuts, outside } => {
                     bodies |= bit(*body);
-                    if !are_many {
+                    if are_many {
+                        many.push(k);
+                    } else {
                         let own = lambert(x, normal, &clip.part);
                         hidden_all += own - hidden((x, normal), &clip.part, own, (&of[..k], planes), clips);
                     }
+                    // Nothing bends where other edges of a round outline cut.
+                    let how = if round[k] { outside << 32 } else { cuts ^ outside << 32 };
                     hash = (hash ^ how ^ u64::from(*body) << 48).wrapping_mul(MIX).rotate_left(29);
                 }
             }
@@ -113,8 +128,7 @@ impl Shadows {
         }
         let whole = lambert(x, normal, target);
         if are_many {
-            let left = left(target, of.iter().map(|(_, range)| &planes[range.clone()]), clip);
-            hidden_all = whole - left.iter().map(|piece| lambert(x, normal, piece)).sum::<f64>();
+            hidden_all = hidden_by_many((x, normal), target, &many, (of, planes), &mut self.clips);
         }
         Sight::Partly { factors: [(whole - hidden_all).max(0.0), hidden_all], bodies, how: hash }
     }
@@ -163,6 +177,71 @@ fn throw(x: DVec3, occluder: &Occluder, touch: f64, planes: &mut Vec<Plane>) -> 
     true
 }
 
+/// Many shadows, by index.
+type Many = SmallVec<[usize; 32]>;
+
+/// Shadows in both halves of a polygon, by those in the whole, above which it is not halved.
+const HALVED: f64 = 1.6;
+
+/// F to what many shadows hide of a convex polygon, each of which cuts it. It is halved until few do: of a mesh, whose shadows lie
+/// side by side, that takes n log n.
+fn hidden_by_many(
+    (x, normal): (DVec3, DVec3),
+    target: &[DVec3],
+    many: &[usize],
+    (shadows, planes): (&[(u16, Range<usize>)], &[Plane]),
+    clips: &mut [Clip; FEW + 1],
+) -> f64 {
+    let planes_of = |k: &usize| &planes[shadows[*k].1.clone()];
+    if many.len() <= FEW {
+        let few: SmallVec<[(u16, Range<usize>); FEW]> = many.iter().map(|k| shadows[*k].clone()).collect();
+        return hidden((x, normal), target, lambert(x, normal, target), (&few, planes), clips);
+    }
+    let [clip, ..] = clips;
+    let mut in_half = |half: &Loop| {
+        let mut left = Many::new();
+        for k in many {
+            match within(half, planes_of(k), clip) {
+                Within::None => {}
+                Within::Part { .. } => left.push(*k),
+                Within::All => return None,
+            }
+        }
+        Some(left)
+    };
+    let found = halves(target).find_map(|halves| {
+        let lists = halves.each_ref().map(&mut in_half);
+        let both: usize = lists.iter().flatten().map(SmallVec::len).sum();
+        (both as f64 <= HALVED * many.len() as f64).then_some((halves, lists))
+    });
+    match found {
+        Some((halves, lists)) => {
+            let of_half = |(half, list): (&Loop, &Option<Many>)| match list {
+                Some(list) => hidden_by_many((x, normal), half, list, (shadows, planes), clips),
+                None => lambert(x, normal, half),
+            };
+            halves.iter().zip(&lists).map(of_half).sum()
+        }
+        None => {
+            let left = left(target, many.iter().map(planes_of), clip);
+            lambert(x, normal, target) - left.iter().map(|piece| lambert(x, normal, piece)).sum::<f64>()
+        }
+    }
+}
+
+/// A convex polygon halved across its length, and along it.
+fn halves(polygon: &[DVec3]) -> impl Iterator<Item = [Loop; 2]> {
+    let middle = polygon.iter().sum::<DVec3>() / polygon.len() as f64;
+    let farthest = polygon.iter().map(|p| *p - middle).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+    let length = farthest.unwrap_or_default();
+    let width = twice_area(polygon).cross(length);
+    [length, width].into_iter().filter_map(move |normal| {
+        let mut half: Loop = polygon.into();
+        let other = cut_off(&mut half, normal, normal.dot(middle))?;
+        Some([half, other])
+    })
+}
+
 /// What shadows leave of a polygon, as convex pieces.
 fn left<'a>(target: &[DVec3], shadows: impl Iterator<Item = &'a [Plane]>, clip: &mut Clip) -> Vec<Loop> {
     let mut pieces: Vec<Loop> = vec![target.into()];
@@ -173,7 +252,7 @@ fn left<'a>(target: &[DVec3], shadows: impl Iterator<Item = &'a [Plane]>, clip: 
                 Within::None => next.push(piece),
                 Within::All => {}
                 // Plane by plane: what lies below one is left, what lies above all is hidden.
-                Within::Part(_) => {
+                Within::Part { .. } => {
                     for &(normal, offset) in shadow {
                         let mut below = piece.clone();
                         if keep_above(&mut below, -normal, -offset) {
@@ -205,7 +284,7 @@ fn hidden(
         match within(target, &planes[range.clone()], clip) {
             Within::None => {}
             Within::All => return whole,
-            Within::Part(_) => {
+            Within::Part { .. } => {
                 let own = lambert(x, normal, &clip.part);
                 sum += own - hidden((x, normal), &clip.part, own, (&shadows[..k], planes), clips);
             }
@@ -217,8 +296,11 @@ fn hidden(
 /// How much of a polygon lies within a shadow.
 enum Within {
     None,
-    /// A part, and how it comes about: which planes cut, and which corners lie within.
-    Part(u64),
+    /// A part, and how it comes about: which planes cut, and which corners lie outside, as bits.
+    Part {
+        cuts: u64,
+        outside: u64,
+    },
     All,
 }
 
@@ -227,13 +309,13 @@ enum Within {
 fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
     match <&[DVec3; 4]>::try_from(polygon) {
         Ok(four) => within_shadow(four, shadow, clip, &mut [0.0; 4]),
-        Err(_) => within_shadow(polygon, shadow, clip, &mut SmallVec::<[f64; 16]>::from_elem(0.0, polygon.len())),
+        Err(_) if polygon.len() <= 8 => within_shadow(polygon, shadow, clip, &mut [0.0; 8]),
+        Err(_) => within_shadow(polygon, shadow, clip, &mut vec![0.0; polygon.len()]),
     }
 }
 
 #[inline(always)]
 fn within_shadow(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip, heights: &mut [f64]) -> Within {
-    // Planes that cut and corners that lie outside, as bits.
     let (mut cuts, mut outside, mut first) = (0u64, 0u64, None);
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
@@ -251,10 +333,10 @@ fn within_shadow(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip, heights: 
             if first.is_none() {
                 first = Some(k);
                 clip.part.clear();
-                keep(polygon, heights.iter().copied(), reach, |p| clip.part.push(p));
+                keep(polygon, heights[..polygon.len()].iter().copied(), reach, |p| clip.part.push(p));
             }
             cuts |= 1 << k.min(63);
-            for (i, h) in heights.iter().enumerate() {
+            for (i, h) in heights.iter().enumerate().take(polygon.len()) {
                 outside |= u64::from(*h < -reach) << (i % 32);
             }
         }
@@ -265,7 +347,7 @@ fn within_shadow(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip, heights: 
             return Within::None;
         }
     }
-    Within::Part(cuts ^ outside << 32)
+    Within::Part { cuts, outside }
 }
 
 impl Clip {
@@ -340,4 +422,53 @@ pub fn cut_off(polygon: &mut Loop, normal: DVec3, offset: f64) -> Option<Loop> {
     }
     *polygon = above;
     Some(below)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::{Body, Setting};
+    use super::super::panel::Panel;
+    use super::super::solid::Obstacles;
+    use super::*;
+    use radiosity_trace::sampling::Random;
+
+    /// A sheet of squares side by side before a target, and others strewn before and behind it: what they hide together is what is
+    /// missing of the pieces that they leave.
+    #[test]
+    fn many_shadows_hide_what_they_leave_not() {
+        let mut random = Random::new(3);
+        let square = |[x, y, z]: [f64; 3], size: f64| {
+            let corners =
+                [[0., 0.], [1., 0.], [1., 1.], [0., 1.]].map(|[u, v]| DVec3::new(x + size * u, y + size * v, z));
+            Panel::new(corners.into(), DVec3::Z)
+        };
+        let mut panels: Vec<Panel> = (0..144)
+            .map(|k| square([0.05 * f64::from(k % 12) - 0.2, 0.05 * f64::from(k / 12) - 0.35, 1.0], 0.05))
+            .collect();
+        panels.extend((0..60).map(|_| {
+            let [x, y, z, size] = std::array::from_fn(|_| random.next_unit());
+            square([1.6 * x - 0.9, 1.6 * y - 0.9, 0.5 + z], 0.3 * size)
+        }));
+        let target = [[-1., -1.], [-0.9, 1.1], [1., 1.], [1.2, -1.]].map(|[x, y]| DVec3::new(x, y, 2.0));
+        let panels: Vec<&Panel> = panels.iter().collect();
+        let obstacles = Obstacles { panels: &[], solids: &[] };
+        let setting = Setting { panels: &panels, obstacles, target: &target, touch: 1e-7 };
+        let mut shadows = Shadows::default();
+        for _ in 0..20 {
+            let x = DVec3::new(random.next_unit() - 0.5, random.next_unit() - 0.5, 0.0);
+            let occluders: Vec<(u16, Occluder)> = (0..panels.len() as u16)
+                .filter_map(|k| Some((k, Occluder::new(Body::Panel(k), setting, x)?)))
+                .collect();
+            let of = || occluders.iter().map(|(k, occluder)| (*k, occluder));
+            let Sight::Partly { factors: [visible, hidden], .. } = shadows.sight((x, DVec3::Z), &target, of(), 1e-7)
+            else {
+                panic!("some of it is hidden")
+            };
+            let Shadows { planes, of, clips: [clip, ..], .. } = &mut shadows;
+            let left = left(&target, of.iter().map(|(_, range)| &planes[range.clone()]), clip);
+            let by_pieces: f64 = left.iter().map(|piece| lambert(x, DVec3::Z, piece)).sum();
+            assert!((visible - by_pieces).abs() < 1e-12, "{visible} {by_pieces}");
+            assert!(hidden > 0.01 && visible > 0.01, "{hidden} {visible}");
+        }
+    }
 }

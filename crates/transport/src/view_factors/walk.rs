@@ -11,7 +11,7 @@ use super::moments::{Far, Four, Moments};
 use super::panel::Panel;
 use super::part::Part;
 use super::shaft::{Look, Shaft, Stands};
-use super::solid::{Obstacles, Solid, looks_away};
+use super::solid::{Obstacles, Outside, Solid};
 use super::store::Entry;
 use super::visible::Shadows;
 use super::{Choices, ViewFactorOptions};
@@ -203,8 +203,9 @@ impl<'a> Walk<'a> {
     /// Of panels those that may hide something from a region: of solids outside of it the faces that look towards it.
     fn facing(&self, panels: &[u32], region: &[DVec3]) -> SmallVec<[&'a Panel; 16]> {
         let obstacles = Obstacles { panels: self.panels, solids: self.solids };
+        let mut outside = Outside::new(obstacles, region, self.touch);
         let panels = panels.iter().map(|panel| &self.panels[*panel as usize]);
-        panels.filter(|panel| !looks_away(panel, obstacles, region, self.touch)).collect()
+        panels.filter(|panel| !outside.looks_away(panel)).collect()
     }
 
     /// All pairs of a leaf with one part, by index and its number in the gallery.

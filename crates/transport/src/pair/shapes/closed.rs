@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::body::{Body, Kind};
-use super::element::solid_angle;
 use crate::pair::Factor;
+use crate::polygon::solid_angle;
 
 /// Lengths that agree to this share are one length: rounding of coordinates.
 const SAME: f64 = 1e-13;

@@ -71,10 +71,3 @@ fn edge(a: DVec3, b: DVec3, n: DVec3) -> f64 {
     let sine = cross.length();
     if sine > 0.0 { sine.atan2(a.dot(b)) / sine * cross.dot(n) } else { 0.0 }
 }
-
-/// Solid angle of a triangle whose corners are given relative to the eye (Van Oosterom and Strackee 1983).
-pub(super) fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
-    let (x, y, z) = (a.length(), b.length(), c.length());
-    let below = x * y * z + a.dot(b) * z + a.dot(c) * y + b.dot(c) * x;
-    2.0 * a.dot(b.cross(c)).abs().atan2(below)
-}
