@@ -76,7 +76,7 @@ pub fn parse_points_csv(file: &str, bytes: &[u8]) -> Result<Points, LoadError> {
     let (mut all, mut bad, mut faults) = (Points { names, ..Points::default() }, 0_usize, Faults::default());
     for (at, line) in lines {
         let cells = split(line, separator);
-        match point(&cells, columns, separator == ';') {
+        match fits(&cells, header.len()).and_then(|()| point(&cells, columns, separator == ';')) {
             Ok(point) => {
                 all.points.push(point);
                 // A line may end before its last columns do.
@@ -116,6 +116,13 @@ fn split(line: &str, separator: char) -> Vec<String> {
         None => text.trim().to_owned(),
     };
     parts.map(cell).collect()
+}
+
+/// Numbers with a decimal comma are two cells each where commas separate: no line has more cells than the header names.
+fn fits(cells: &[String], columns: usize) -> Result<(), (String, &'static str)> {
+    let given = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+    let what = format!("{} where the header names {columns}", counted(given, "column", "columns"));
+    if given <= columns { Ok(()) } else { Err((what, "write numbers with a decimal point, or name all columns")) }
 }
 
 fn point(cells: &[String], columns: [usize; 6], comma: bool) -> Result<Point, (String, &'static str)> {
@@ -179,6 +186,13 @@ mod tests {
             (quoted.names, &quoted.cells[0]),
             (vec!["the, place".to_owned(), String::new()], &vec!["a \"b\", c".to_owned(), String::new()])
         );
+    }
+
+    #[test]
+    fn decimal_commas_are_not_read_as_separators() {
+        let text = "x,y,z,nx,ny,nz\n1,5,2,25,0,75,0,0,1\n1,2,3,0,0,1,\n";
+        let text = parse_points_csv("p.csv", text.as_bytes()).unwrap_err().to_string();
+        assert!(text.contains("p.csv:2: 9 columns where the header names 6") && !text.contains("p.csv:3"), "{text}");
     }
 
     #[test]
