@@ -106,7 +106,8 @@ impl Shadows {
         let are_many = of.len() > FEW;
         let mut many = Many::new();
         for (k, (body, range)) in of.iter().enumerate() {
-            match within(target, &planes[range.clone()], clip) {
+            let shadow = &planes[range.clone()];
+            match if are_many { falls(target, shadow) } else { within(target, shadow, clip) } {
                 Within::None => {}
                 Within::All => return Sight::Nothing(*body),
                 Within::Part { cuts, outside } => {
@@ -197,11 +198,10 @@ fn hidden_by_many(
         let few: SmallVec<[(u16, Range<usize>); FEW]> = many.iter().map(|k| shadows[*k].clone()).collect();
         return hidden((x, normal), target, lambert(x, normal, target), (&few, planes), clips);
     }
-    let [clip, ..] = clips;
-    let mut in_half = |half: &Loop| {
+    let in_half = |half: &Loop| {
         let mut left = Many::new();
         for k in many {
-            match within(half, planes_of(k), clip) {
+            match falls(half, planes_of(k)) {
                 Within::None => {}
                 Within::Part { .. } => left.push(*k),
                 Within::All => return None,
@@ -210,7 +210,7 @@ fn hidden_by_many(
         Some(left)
     };
     let found = halves(target).find_map(|halves| {
-        let lists = halves.each_ref().map(&mut in_half);
+        let lists = halves.each_ref().map(in_half);
         let both: usize = lists.iter().flatten().map(SmallVec::len).sum();
         (both as f64 <= HALVED * many.len() as f64).then_some((halves, lists))
     });
@@ -223,7 +223,7 @@ fn hidden_by_many(
             halves.iter().zip(&lists).map(of_half).sum()
         }
         None => {
-            let left = left(target, many.iter().map(planes_of), clip);
+            let left = left(target, many.iter().map(planes_of), &mut clips[0]);
             lambert(x, normal, target) - left.iter().map(|piece| lambert(x, normal, piece)).sum::<f64>()
         }
     }
@@ -304,9 +304,19 @@ enum Within {
     All,
 }
 
-/// How much of a polygon lies within a shadow; a part is left in `clip`. Nearly all have four corners, and loops whose length
-/// is known take half the time.
+/// How much of a polygon lies within a shadow; a part is left in `clip`.
 fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
+    held(polygon, shadow, Some(clip))
+}
+
+/// The same without the part: what no plane has outside counts as one, though all of them together may leave nothing.
+fn falls(polygon: &[DVec3], shadow: &[Plane]) -> Within {
+    held(polygon, shadow, None)
+}
+
+/// Nearly all have four corners, and loops whose length is known take half the time.
+#[inline(always)]
+fn held(polygon: &[DVec3], shadow: &[Plane], clip: Option<&mut Clip>) -> Within {
     match <&[DVec3; 4]>::try_from(polygon) {
         Ok(four) => within_shadow(four, shadow, clip, &mut [0.0; 4]),
         Err(_) if polygon.len() <= 8 => within_shadow(polygon, shadow, clip, &mut [0.0; 8]),
@@ -315,7 +325,7 @@ fn within(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip) -> Within {
 }
 
 #[inline(always)]
-fn within_shadow(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip, heights: &mut [f64]) -> Within {
+fn within_shadow(polygon: &[DVec3], shadow: &[Plane], mut clip: Option<&mut Clip>, heights: &mut [f64]) -> Within {
     let (mut cuts, mut outside, mut first) = (0u64, 0u64, None);
     for (k, &(normal, offset)) in shadow.iter().enumerate() {
         let (mut low, mut high) = (0.0f64, 0.0f64);
@@ -330,11 +340,11 @@ fn within_shadow(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip, heights: 
             return Within::None;
         }
         if low < -reach {
-            if first.is_none() {
-                first = Some(k);
+            if let (None, Some(clip)) = (first, &mut clip) {
                 clip.part.clear();
                 keep(polygon, heights[..polygon.len()].iter().copied(), reach, |p| clip.part.push(p));
             }
+            first = first.or(Some(k));
             cuts |= 1 << k.min(63);
             for (i, h) in heights.iter().enumerate().take(polygon.len()) {
                 outside |= u64::from(*h < -reach) << (i % 32);
@@ -342,9 +352,11 @@ fn within_shadow(polygon: &[DVec3], shadow: &[Plane], clip: &mut Clip, heights: 
         }
     }
     let Some(first) = first else { return Within::All };
-    for (k, &(normal, offset)) in shadow.iter().enumerate().skip(first + 1) {
-        if cuts >> k.min(63) & 1 == 1 && !clip.keep_above(normal, offset) {
-            return Within::None;
+    if let Some(clip) = clip {
+        for (k, &(normal, offset)) in shadow.iter().enumerate().skip(first + 1) {
+            if cuts >> k.min(63) & 1 == 1 && !clip.keep_above(normal, offset) {
+                return Within::None;
+            }
         }
     }
     Within::Part { cuts, outside }
