@@ -231,9 +231,9 @@ impl Sides {
         if let Some(known) = self.sides.iter().position(|side| side.signs == signs) {
             return known;
         }
-        let is_crossed =
+        let is_cut =
             |body: usize| self.faces.iter().zip(&signs).any(|(face, sign)| face.0 as usize == body && *sign == 0);
-        let is_varying = |body: usize| self.round.binary_search(&(body as u16)).is_ok() || is_crossed(body);
+        let is_varying = |body: usize| self.round.binary_search(&(body as u16)).is_ok() || is_cut(body);
         let seen = |(k, body): (usize, &Body)| match Occluder::new(*body, setting, centre) {
             _ if is_varying(k) => Seen::Varying,
             Some(occluder) => occluder.before(&self.region, setting).map_or(Seen::Nothing, Seen::As),

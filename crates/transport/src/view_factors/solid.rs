@@ -81,22 +81,18 @@ pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Solid> {
         if !closed || faces.len() < 4 || faces.len() > MOST_FACES {
             continue;
         }
-        let is_convex = || {
-            let corners = || faces.iter().flat_map(|f| &panels[*f as usize].corners);
-            faces.iter().all(|f| corners().all(|c| panels[*f as usize].height(*c) <= touch))
-        };
-        let is_convex = is_convex();
+        let corners = || faces.iter().flat_map(|face| &panels[*face as usize].corners);
+        let is_convex = faces.iter().all(|face| corners().all(|c| panels[*face as usize].height(*c) <= touch));
         if is_convex || has_the_outside_before_it(panels, &faces, touch) {
-            let corners = || faces.iter().flat_map(|f| &panels[*f as usize].corners);
-            let [low, high] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-            let bounds = [corners().fold(low, |low, p| low.min(*p)), corners().fold(high, |high, p| high.max(*p))];
+            let low = corners().fold(DVec3::INFINITY, |low, c| low.min(*c));
+            let high = corners().fold(DVec3::NEG_INFINITY, |high, c| high.max(*c));
             let number: FxHashMap<u32, u16> = faces.iter().zip(0..).map(|(face, number)| (*face, number)).collect();
             let edges =
                 of_edges.into_iter().map(|(face, beyond, line)| (number[&face], number[&beyond], line)).collect();
             for face in &faces {
                 panels[*face as usize].solid = Some(solids.len() as u32);
             }
-            solids.push(Solid { is_convex, bounds, faces, edges });
+            solids.push(Solid { is_convex, bounds: [low, high], faces, edges });
         }
     }
     solids
