@@ -28,7 +28,7 @@ pub use facet::{Enclosure, EnclosureSurface, Facet, FacetError};
 pub use fault::{Fault, Faults, Severity, counted, size};
 pub use light::{PointLight, PointLightKind};
 pub use material::{AlphaMode, Material, TextureRef, Transmission};
-pub use mesh::{EdgeSide, Mesh, Side};
+pub use mesh::{EdgeSide, Mesh, Side, Weld};
 pub use scene::{Object, Scene, Source, Surface, Up};
 pub use sky::{Sky, SkyPatches};
 pub use spectrum::{Illuminant, SpectralBands, SpectrumError};

@@ -18,7 +18,7 @@ use edges::{is_balanced, ordered};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use weld::Weld;
+pub use weld::Weld;
 
 /// Vertices closer than this share of the scene's largest extent are one vertex. Single precision resolves 6e-8 of
 /// it; exporters that place instances by single-precision matrices miss by some 3e-7. Ten times more would weld

@@ -9,11 +9,19 @@ const CELL: f64 = 8.0;
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
-/// Finds vertices by their place. The first of a cluster represents it.
+/// Finds vertices by their place, metres. The first of a cluster represents it.
+///
+/// ```
+/// use glam::DVec3;
+/// let (mut weld, mut vertices) = (radiosity_scene::Weld::new(1e-6), Vec::new());
+/// let places = [DVec3::ZERO, DVec3::X, DVec3::splat(5e-7)];
+/// assert_eq!(places.map(|place| weld.vertex(&mut vertices, place)), [0, 1, 0]);
+/// ```
 ///
 /// The grid is a table of vertices by the hash of their cell, with linear probing (Knuth 1998, vol. 3, sect. 6.4): eight to
 /// sixteen bytes a vertex.
-pub(super) struct Weld {
+#[derive(Clone, Debug)]
+pub struct Weld {
     pub(super) tolerance: f64,
     /// Vertices and [`NONE`], as many as a power of two, at most half of them vertices.
     table: Vec<u32>,
@@ -21,12 +29,13 @@ pub(super) struct Weld {
 }
 
 impl Weld {
-    pub(super) fn new(tolerance: f64) -> Weld {
+    /// No vertices yet; those within `tolerance`, m, of each other are one.
+    pub fn new(tolerance: f64) -> Weld {
         Weld { tolerance, table: vec![NONE; 16], count: 0 }
     }
 
-    /// The vertex at a place, added where there is none.
-    pub(super) fn vertex(&mut self, vertices: &mut Vec<DVec3>, p: DVec3) -> u32 {
+    /// The vertex at a place, added where there is none. All calls are given the same `vertices`, empty at first.
+    pub fn vertex(&mut self, vertices: &mut Vec<DVec3>, p: DVec3) -> u32 {
         // The cells within the tolerance of p: two at most along each axis.
         let (low, high) = (self.cell(p - self.tolerance), self.cell(p + self.tolerance));
         let mut found = NONE;

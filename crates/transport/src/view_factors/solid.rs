@@ -8,6 +8,7 @@ use super::body::Line;
 use super::panel::Panel;
 use crate::polygon::solid_angle;
 use glam::DVec3;
+use radiosity_scene::Weld;
 use rustc_hash::FxHashMap;
 
 /// A closed body.
@@ -101,25 +102,10 @@ pub fn find_solids(panels: &mut [Panel], touch: f64) -> Vec<Solid> {
 /// The corners of each panel with their numbers. Those nearer to each other than `reach` have one number, and follow each other
 /// only once.
 fn outlines(panels: &[Panel], reach: f64) -> Vec<Vec<(u32, DVec3)>> {
-    let mut cells: FxHashMap<[i64; 3], Vec<(u32, DVec3)>> = FxHashMap::default();
-    let mut all = 0;
-    let mut number = |p: DVec3| {
-        let cell = |p: DVec3| (p / (2.0 * reach)).to_array().map(|x| x.floor() as i64);
-        // Those in reach lie in the cells of the corners of a cube about it.
-        let corner =
-            |k: usize| DVec3::from_array(std::array::from_fn(|axis| if k >> axis & 1 == 1 { reach } else { -reach }));
-        let near = (0..8).filter_map(|k| cells.get(&cell(p + corner(k))));
-        match near.flatten().find(|(_, other)| p.distance_squared(*other) <= reach * reach) {
-            Some((known, _)) => *known,
-            None => {
-                cells.entry(cell(p)).or_default().push((all, p));
-                all += 1;
-                all - 1
-            }
-        }
-    };
+    let (mut weld, mut vertices) = (Weld::new(reach), Vec::new());
     let outline = |panel: &Panel| {
-        let mut outline: Vec<(u32, DVec3)> = panel.corners.iter().map(|p| (number(*p), *p)).collect();
+        let number = |p: &DVec3| (weld.vertex(&mut vertices, *p), *p);
+        let mut outline: Vec<(u32, DVec3)> = panel.corners.iter().map(number).collect();
         outline.dedup_by_key(|(number, _)| *number);
         if outline.len() > 1 && outline.first().map(|p| p.0) == outline.last().map(|p| p.0) {
             outline.pop();
