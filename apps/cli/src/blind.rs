@@ -1,6 +1,6 @@
 //! Surfaces that see nothing: rows of a matrix of factors that are all zero, and why they are.
 
-use radiosity::transport::{FormFactorMethod, FormFactors};
+use radiosity::transport::FormFactors;
 use radiosity::{Enclosure, Facet};
 
 /// Height above a plane that counts as none, relative to the extent of the scene: below what single precision leaves of
@@ -19,16 +19,17 @@ pub enum Why {
 }
 
 impl Why {
-    /// Why surface `blind` sees nothing by a method: facets before each other that it yet sees nothing of are hidden, where the
-    /// method proves it. Others look at samples.
-    pub fn of(enclosure: &Enclosure, method: FormFactorMethod, blind: usize) -> Why {
+    /// Why surface `blind` sees nothing by these factors: facets before each other that it yet sees nothing of are hidden, where
+    /// pairs were proven to be. Other methods look at samples.
+    pub fn of(enclosure: &Enclosure, factors: &FormFactors, blind: usize) -> Why {
+        let is_proven = factors.choices.is_some_and(|choices| choices.rays == 0);
         let facets = || enclosure.facets.iter().zip(&enclosure.surface_of);
         let size = enclosure.bounds().map_or(0.0, |[low, high]| low.distance(high));
         let faces = |from: &Facet, to: &Facet| to.corners().iter().any(|corner| from.height(*corner) > FLAT * size);
         let own = facets().filter(|(_, surface)| **surface as usize == blind);
         for (facet, _) in own {
             if facets().any(|(other, _)| faces(facet, other) && faces(other, facet)) {
-                return if method == FormFactorMethod::Adaptive { Why::Hidden } else { Why::Unmet };
+                return if is_proven { Why::Hidden } else { Why::Unmet };
             }
         }
         Why::Alone

@@ -35,8 +35,9 @@ pub struct Arguments {
     /// Width of elements in metres, for `--by element`.
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     element_size: Option<f64>,
-    /// Largest error of a factor between facets that see each other partly, 1e-5 by default; for the adaptive method. What is
-    /// not hidden at all is found to 1e-9 or better.
+    /// Largest error of a factor between surfaces that see each other partly, 1e-5 by default; for the adaptive method. What is
+    /// not hidden at all is found to 1e-9 or better. Surfaces of very many facets send rays, by default until factors are good to
+    /// 1e-3: seconds for furniture, where 1e-5 takes hours.
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = numbers::positive)]
     accuracy: Option<f64>,
     /// Cells along a side of the surface that hemicube and its like project on, an even number from 4 to 2048, 256 by
@@ -136,12 +137,15 @@ impl Arguments {
         }
     }
 
-    fn options(&self) -> FactorsOptions {
+    fn options(&self, enclosure: &Enclosure) -> FactorsOptions {
         let mut options = FactorsOptions { method: self.method, close: self.close, ..FactorsOptions::default() };
         let form = &mut options.form;
-        form.adaptive.accuracy = self.accuracy.unwrap_or(form.adaptive.accuracy);
-        form.adaptive.clear_accuracy = form.adaptive.clear_accuracy.min(form.adaptive.accuracy);
         form.adaptive.memory = self.memory;
+        match self.accuracy {
+            Some(accuracy) => form.adaptive.accuracy = accuracy,
+            None => form.adaptive = form.adaptive.usual(enclosure),
+        }
+        form.adaptive.clear_accuracy = form.adaptive.clear_accuracy.min(form.adaptive.accuracy);
         form.look.resolution = self.resolution.map_or(form.look.resolution, usize::from);
         options
     }
@@ -219,7 +223,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         refuse_long_names(&input.enclosure)?;
     }
     progress.parts();
-    let found = radiosity::factors(&input.enclosure, &arguments.options(), progress)?;
+    let found = radiosity::factors(&input.enclosure, &arguments.options(&input.enclosure), progress)?;
     let table = Table::new(&input, &found, (emittances, is_script_f), arguments.memory)?;
 
     if let (Some(path), Some(format)) = (&arguments.output, format) {
@@ -461,7 +465,7 @@ fn warnings(input: &Input, found: &Factors) -> Vec<String> {
         lines.push(format!(
             "warning: the accuracy of {:e} was not reached between {} (cut large surfaces into pieces, or allow more): {}",
             missed.asked,
-            counted(missed.pairs, "pair of facets", "pairs of facets"),
+            counted(missed.pairs, "pair of surfaces", "pairs of surfaces"),
             largest_error(&input.enclosure, found),
         ));
     }
@@ -490,7 +494,11 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
     }
     let mut lines = vec![head];
     lines.extend(input.vs3.iter().flat_map(|vs3| rows_of_vs3(vs3, enclosure, table.is_script_f)));
-    if let Some(c) = found.factors.choices {
+    let choices = found.factors.choices;
+    if let Some(rays) = choices.map(|c| c.rays).filter(|rays| *rays > 0) {
+        let usual = if arguments.accuracy.is_none() { ", until factors are good to 1e-3 (--accuracy)" } else { "" };
+        lines.push(format!("{rays} rays from all over surfaces, as pairs of facets take longer{usual}"));
+    } else if let Some(c) = choices {
         let cubature: usize = c.clear_cubature.iter().sum();
         lines.push(format!(
             "of {} pairs {} face away, {} are proven blocked, {} proven clear ({} in closed form), {} partly hidden",
@@ -511,7 +519,7 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
         sums += &format!("; off from one by {:.1e} (RMS), the most at {worst}", closure.rms);
     }
     lines.push(sums);
-    lines.extend(blind_rows(enclosure, arguments.method, found));
+    lines.extend(blind_rows(enclosure, found));
     if arguments.method == FormFactorMethod::Adaptive {
         lines.push("reciprocal by storage".to_owned());
     } else {
@@ -547,13 +555,14 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
 }
 
 /// Which rows are all zero, and why.
-fn blind_rows(enclosure: &Enclosure, method: FormFactorMethod, found: &Factors) -> Option<String> {
+fn blind_rows(enclosure: &Enclosure, found: &Factors) -> Option<String> {
     let blind = blind(&found.factors);
     if blind.is_empty() {
         return None;
     }
-    let told =
-        |surface: &usize| format!("{} ({})", name(enclosure, *surface), Why::of(enclosure, method, *surface).told());
+    let told = |surface: &usize| {
+        format!("{} ({})", name(enclosure, *surface), Why::of(enclosure, &found.factors, *surface).told())
+    };
     let first: Vec<String> = blind.iter().take(LISTED).map(told).collect();
     let more = blind.len() - first.len();
     let rows = counted(blind.len(), "row is all zero: its surface sees", "rows are all zero: their surfaces see");
@@ -593,7 +602,7 @@ fn event(
         "closure": found.closure, "row_sums": found.row_sums, "reciprocity": found.reciprocity,
         "zero_rows": blind(&found.factors).into_iter().map(named).collect::<Vec<_>>(),
         "largest_error": { "error": found.largest_error.error, "pair": found.largest_error.pair.map(named) },
-        "accuracy_missed": found.missed.map(|m| json!({ "asked": m.asked, "facet_pairs": m.pairs })),
+        "accuracy_missed": found.missed.map(|m| json!({ "asked": m.asked, "pairs": m.pairs })),
         "excess": found.excess.map(|e| json!({ "rows": e.rows, "row": named(e.row), "sum": e.sum, "errors": e.errors })),
         "repair": found.repair, "choices": found.factors.choices, "stages": progress.spent(),
         "seconds": progress.seconds(), "output": arguments.output, "factors": rows,

@@ -7,7 +7,7 @@ use crate::monitor::{Monitor, Watch};
 use crate::{Error, Stages};
 use radiosity_scene::Enclosure;
 use radiosity_solve::{SolveError, script_f};
-use radiosity_transport::view_factors::{Closure, Repair, ViewFactors, view_factors};
+use radiosity_transport::view_factors::{Closure, Repair, ViewFactors, surface_factors};
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors};
 use serde::Serialize;
 
@@ -58,7 +58,7 @@ pub struct Doubt {
 /// An accuracy that was not reached.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Missed {
-    /// Pairs of facets whose stated error, of the factor from the smaller one, is larger than asked.
+    /// Pairs of surfaces whose stated error, of the factor from the smaller one, is larger than asked.
     pub pairs: usize,
     /// What was asked.
     pub asked: f64,
@@ -144,16 +144,11 @@ pub fn factors(enclosure: &Enclosure, options: &FactorsOptions, monitor: &dyn Mo
         let reciprocity = found.reciprocity();
         return Ok(Factors::of(found, reciprocity, stages));
     }
-    let found = stages.time(monitor, "form factors", || view_factors(enclosure, &options.form.adaptive, &watch))?;
-    let missed = Missed::of(&found, options.form.adaptive.accuracy);
-    let mut found: ViewFactors =
-        if enclosure.surfaces.len() == enclosure.facets.len() { found } else { found.by_surface(enclosure) };
-    let raw = |found: ViewFactors| {
-        // Stored once for both directions.
-        let raw = Factors::of(found.into(), 0.0, stages);
-        // Of surfaces that are as exact as was asked nobody need know which facets are not.
-        Factors { missed: missed.filter(|missed| raw.largest_error.error > missed.asked), ..raw }
-    };
+    let form = &options.form.adaptive;
+    let mut found = stages.time(monitor, "form factors", || surface_factors(enclosure, form, &watch))?;
+    let missed = Missed::of(&found, form.accuracy);
+    // Stored once for both directions.
+    let raw = |found: ViewFactors| Factors { missed, ..Factors::of(found.into(), 0.0, stages) };
     if !options.close {
         return Ok(raw(found));
     }

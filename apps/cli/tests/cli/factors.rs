@@ -131,12 +131,12 @@ fn an_accuracy_that_was_not_reached_and_rows_above_one_are_warned_of() {
     let missed = room.run(call);
     assert_eq!(missed.code, Some(0), "{missed:?}");
     assert!(
-        missed.err.contains("warning: the accuracy of 1e-30 was not reached between 1 pair of facets"),
+        missed.err.contains("warning: the accuracy of 1e-30 was not reached between 1 pair of surfaces"),
         "{missed:?}"
     );
     assert_eq!(missed.err.matches("errors of factors at most").count(), 1, "{missed:?}");
     let event = room.run(call.iter().chain(&["--json"])).result();
-    assert_eq!(event["accuracy_missed"]["facet_pairs"], 1, "{event}");
+    assert_eq!(event["accuracy_missed"]["pairs"], 1, "{event}");
     assert!(event["largest_error"]["error"].as_f64().unwrap() > 1e-30, "{event}");
     let mut pair: Vec<&str> =
         event["largest_error"]["pair"].as_array().unwrap().iter().filter_map(Value::as_str).collect();

@@ -4,7 +4,7 @@
 use super::points::is_coplanar;
 use glam::DVec3;
 use radiosity_scene::{Enclosure, Facet};
-use radiosity_trace::{Ray, Tree};
+use radiosity_trace::{Hit, Ray, Tree};
 
 /// Places are drawn this much towards the facet's centre, relative to the coordinates, so that rounding puts none behind a
 /// wall that the facet touches: four units in the last place.
@@ -53,18 +53,25 @@ impl<'a> Around<'a> {
         Ray { origin, direction: direction.as_vec3(), t_max: t_max as f32, skip: u32::MAX }
     }
 
-    /// What a ray meets first of all that is not `ignored` (by facet): the facet whose active side it is, or the number of
-    /// facets where that is nothing, and how far away; infinitely far if the ray escapes.
+    /// The first hit of all that is not ignored (by facet), and the facet, or the number of facets for what only stands in the way.
     #[inline]
-    pub fn meets(&self, place: DVec3, direction: DVec3, ignored: &[bool]) -> (usize, f64) {
+    pub fn first(&self, place: DVec3, direction: DVec3, is_ignored: impl Fn(usize) -> bool) -> Option<(usize, Hit)> {
         let is_met = |triangle: u32, _, _, _| {
             let owner = self.owner[triangle as usize] as usize;
-            !ignored.get(owner).copied().unwrap_or(false)
+            owner == self.enclosure.facets.len() || !is_ignored(owner)
         };
+        let hit = self.tree.closest_where(&self.ray(place, direction, f64::INFINITY), is_met)?;
+        Some((self.owner[hit.triangle as usize] as usize, hit))
+    }
+
+    /// What a ray meets first of all that is not ignored (by facet): the facet whose active side it is, or the number of
+    /// facets where that is nothing, and how far away; infinitely far if the ray escapes.
+    #[inline]
+    pub fn meets(&self, place: DVec3, direction: DVec3, is_ignored: impl Fn(usize) -> bool) -> (usize, f64) {
         let nothing = self.enclosure.facets.len();
-        match self.tree.closest_where(&self.ray(place, direction, f64::INFINITY), is_met) {
-            Some(hit) if hit.back => (nothing, f64::from(hit.t)),
-            Some(hit) => (self.owner[hit.triangle as usize] as usize, f64::from(hit.t)),
+        match self.first(place, direction, is_ignored) {
+            Some((_, hit)) if hit.back => (nothing, f64::from(hit.t)),
+            Some((facet, hit)) => (facet, f64::from(hit.t)),
             None => (nothing, f64::INFINITY),
         }
     }

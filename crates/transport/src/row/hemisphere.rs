@@ -45,9 +45,9 @@ impl Default for Hemisphere {
     }
 }
 
-/// What the rays of a row have met: by facet and half of the sequence, and last what shows nothing.
-struct Counts {
-    hits: Vec<[u32; 2]>,
+/// What the rays of a row have met: by facet (or surface) and by one of N sets as large as each other, and last what shows nothing.
+pub(crate) struct Counts<const N: usize> {
+    hits: Vec<[u32; N]>,
 }
 
 impl Hemisphere {
@@ -64,8 +64,7 @@ impl Hemisphere {
         let places = Places::new(own);
         let sequence = Sequence::new(hash(hash(self.seed) ^ from as u32), STREAM);
         let inwards = around.inwards(own.radius());
-        let nothing = around.enclosure.facets.len();
-        let mut counts = Counts { hits: vec![[0; 2]; nothing + 1] };
+        let mut counts = Counts::<2>::new(around.enclosure.facets.len());
         let mut rays = self.rays.clamp(2, MOST_RAYS).next_power_of_two();
         let mut traced = 0;
         loop {
@@ -73,8 +72,8 @@ impl Hemisphere {
                 let [u, v, x, y] = sequence.point(index as u32).map(f64::from);
                 let place = own.centroid() + inwards * (places.at(x, y) - own.centroid());
                 let direction = cosine_direction(&frame, u, v);
-                let (item, _) = around.meets(place, direction, &own_plane);
-                counts.hits[item][index * 2 / rays] += 1;
+                let (item, _) = around.meets(place, direction, |facet| own_plane[facet]);
+                counts.add(item, index * 2 / rays, 1);
             }
             traced = rays;
             let row = counts.row(rays);
@@ -85,27 +84,47 @@ impl Hemisphere {
             if is_met || rays >= MOST_RAYS {
                 return row;
             }
-            // What was traced becomes the first half.
             rays *= 2;
-            counts.hits.iter_mut().for_each(|[a, b]| (*a, *b) = (*a + *b, 0));
+            counts.fold();
         }
     }
 }
 
-impl Counts {
-    fn row(&self, rays: usize) -> RowFactors {
-        let m = rays as f64;
-        let share = |[a, b]: &[u32; 2]| f64::from(a + b) / m;
-        // Half the difference of two halves has the variance of the whole; smoothed by one hit, so that none means little.
-        let between = |[a, b]: &[u32; 2]| (f64::from(*a) - f64::from(*b)).powi(2) / (m * m);
-        let binomial = |hits: &[u32; 2]| {
+impl Counts<2> {
+    /// What was counted becomes the first half of twice as many.
+    fn fold(&mut self) {
+        self.hits.iter_mut().for_each(|[a, b]| (*a, *b) = (*a + *b, 0));
+    }
+}
+
+impl<const N: usize> Counts<N> {
+    /// Of a row of `n` facets (or surfaces).
+    pub fn new(n: usize) -> Counts<N> {
+        Counts { hits: vec![[0; N]; n + 1] }
+    }
+
+    pub fn add(&mut self, item: usize, set: usize, times: u32) {
+        self.hits[item][set] += times;
+    }
+
+    /// Of so many rays in all.
+    pub fn row(&self, rays: usize) -> RowFactors {
+        let (m, n) = (rays as f64, N as f64);
+        let all = |hits: &[u32; N]| hits.iter().map(|h| f64::from(*h)).sum::<f64>();
+        let share = |hits: &[u32; N]| all(hits) / m;
+        // Of two halves: the square of half their difference. Smoothed by one hit, so that none means little.
+        let between = |hits: &[u32; N]| {
+            let mean = all(hits) / n;
+            hits.iter().map(|h| (f64::from(*h) - mean).powi(2)).sum::<f64>() * n / (n - 1.0) / (m * m)
+        };
+        let binomial = |hits: &[u32; N]| {
             let smooth = (share(hits) * m + 1.0) / (m + 2.0);
             smooth * (1.0 - smooth) / m
         };
-        let met = || self.hits.iter().filter(|[a, b]| a + b > 0);
+        let met = || self.hits.iter().filter(|hits| all(hits) > 0.0);
         let q = (met().map(between).sum::<f64>() / met().map(binomial).sum::<f64>()).clamp(1.0 / m.sqrt(), 1.0);
-        let factor = |hits: &[u32; 2]| {
-            let few = if hits[0] + hits[1] == 0 { 1.0 } else { q };
+        let factor = |hits: &[u32; N]| {
+            let few = if all(hits) == 0.0 { 1.0 } else { q };
             let error = DEVIATIONS * (few * binomial(hits)).max(between(hits)).sqrt();
             Factor { value: share(hits), error }
         };

@@ -12,7 +12,7 @@ mod glance;
 mod global_cube;
 mod gpu;
 mod hemicube;
-mod hemisphere;
+pub(crate) mod hemisphere;
 mod look;
 mod matrix;
 mod method;
@@ -68,4 +68,4 @@ pub trait Row: Sync {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

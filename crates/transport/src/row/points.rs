@@ -80,7 +80,11 @@ pub(crate) struct Places {
 
 impl Places {
     pub fn new(facet: &Facet) -> Places {
-        let triangles = facet.triangles();
+        Places::of(facet.triangles())
+    }
+
+    /// On all of some triangles.
+    pub fn of(triangles: Vec<[DVec3; 3]>) -> Places {
         let areas: Vec<f64> = triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).collect();
         let whole: f64 = areas.iter().sum();
         let mut end = 0.0;
@@ -94,11 +98,16 @@ impl Places {
 
     /// The place of (x, y), both in [0, 1).
     pub fn at(&self, x: f64, y: f64) -> DVec3 {
+        self.find(x, y).1
+    }
+
+    /// The place of (x, y), both in [0, 1), and which triangle it lies on.
+    pub fn find(&self, x: f64, y: f64) -> (usize, DVec3) {
         let k = self.triangles.partition_point(|(_, end)| *end <= x).min(self.triangles.len() - 1);
         let start = if k > 0 { self.triangles[k - 1].1 } else { 0.0 };
         let ([a, b, c], end) = self.triangles[k];
         let (u, root) = (((x - start) / (end - start)).clamp(0.0, 1.0), y.sqrt());
-        a + root * ((1.0 - u) * (b - a) + u * (c - a))
+        (k, a + root * ((1.0 - u) * (b - a) + u * (c - a)))
     }
 }
 

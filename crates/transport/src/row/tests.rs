@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 #[path = "../../tests/rooms/mod.rs"]
 mod rooms;
 use rooms::{add_cut, rectangle};
-pub(super) use rooms::{box_of, room_with_block};
+pub(crate) use rooms::{box_of, room_with_block};
 
 /// Faces of a unit cube (catalogue 20).
 pub(super) const OPPOSITE: f64 = 0.199_824_895_7;

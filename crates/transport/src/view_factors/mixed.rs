@@ -96,12 +96,11 @@ impl<'a> Stage<'a> {
         }
         let of_whole = OF_WHOLE * tolerance / area;
         // Most facets see smoothly enough as they are: places at corners, which neighbours share, and one in the middle tell.
-        if let Some(piece) = self.sides.uncut((&from, outer.moments.radius), &self.bodies, self.setting) {
-            let mut view = View { shadows, stage: self, from: &from, of_whole };
-            let goal = Goal { whole: whole.value, tolerance: UNCUT * tolerance, may_divide: false };
-            if let Some(found) = integrate(&[piece], goal, (&mut view, sights), list) {
-                return Some(found.within(whole));
-            }
+        let pieces = self.sides.uncut((&from, outer.moments.radius), &self.bodies, self.setting);
+        let mut view = View { shadows, stage: self, from: &from, of_whole };
+        let goal = Goal { whole: whole.value, tolerance: UNCUT * tolerance, may_divide: false };
+        if let Some(found) = integrate(&pieces, goal, (&mut view, sights), list) {
+            return Some(found.within(whole));
         }
         let pieces = self.sides.cut((&from, outer.moments.radius), &self.bodies, self.setting);
         let mut view = View { shadows, stage: self, from: &from, of_whole };

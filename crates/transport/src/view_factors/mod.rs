@@ -5,7 +5,7 @@
 //! leaves share (`gallery`, `lattice`), and where those do not suffice from points that are chosen for the pair (`mixed`,
 //! `visible`). The exchange area A_i F_ij is stored once per pair, so
 //! reciprocity holds by storage; what the rows lack of one is therefore an honest measure of the error, and is reported before
-//! any repair (`closure`).
+//! any repair (`closure`). Surfaces of very many facets send rays instead (`surfaces`).
 
 mod adaptive;
 mod body;
@@ -13,6 +13,7 @@ mod cell;
 mod clear;
 mod closure;
 mod cluster;
+mod contact;
 mod frame;
 mod gallery;
 mod lattice;
@@ -24,6 +25,7 @@ mod shaft;
 mod sides;
 mod solid;
 mod store;
+mod surfaces;
 mod visible;
 mod walk;
 
@@ -31,15 +33,17 @@ pub(crate) use clear::Exchange;
 pub use closure::{Closure, Repair};
 pub(crate) use store::Entry;
 pub use store::ViewFactors;
+pub use surfaces::surface_factors;
 
 use crate::row::GpuError;
 use crate::{Progress, Stopped};
 use cell::Sights;
 use cluster::{Clusters, LEAF};
+use contact::exposed;
 use gallery::Kept;
 pub(crate) use panel::{Planes, convex_pieces, panels, united};
 use part::Part;
-use radiosity_scene::Enclosure;
+use radiosity_scene::{Enclosure, Facet};
 use rayon::prelude::*;
 use serde::Serialize;
 use solid::find_solids;
@@ -50,8 +54,8 @@ use walk::Walk;
 /// How exact the factors are to be, and what they may take.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFactorOptions {
-    /// Bound asked for the error of F_ij between surfaces that see each other partly. A surface of many facets may miss it
-    /// by a little, as no pair of facets is asked for less than a tenth of it.
+    /// Bound asked for the error of F_ij between surfaces that see each other partly. Pairs of facets of such surfaces share it
+    /// in squares, as their errors hardly add up.
     pub accuracy: f64,
     /// The same for those that see each other whole.
     pub clear_accuracy: f64,
@@ -108,6 +112,8 @@ pub struct Choices {
     pub clear_closed_form: usize,
     /// Mixed, found by cutting panels out.
     pub clipped: usize,
+    /// Rays, where there were no pairs of facets but rays from all over surfaces.
+    pub rays: usize,
 }
 
 impl Choices {
@@ -119,6 +125,7 @@ impl Choices {
         }
         self.clear_closed_form += other.clear_closed_form;
         self.clipped += other.clipped;
+        self.rays += other.rays;
     }
 
     /// All pairs.
@@ -150,14 +157,19 @@ pub fn view_factors(
     options: &ViewFactorOptions,
     progress: &dyn Progress,
 ) -> Result<ViewFactors, FactorError> {
-    let areas: Vec<f64> = enclosure.facets.iter().map(radiosity_scene::Facet::area).collect();
+    let areas: Vec<f64> = enclosure.facets.iter().map(Facet::area).collect();
     let Some([low, high]) = enclosure.bounds() else { return Ok(ViewFactors::default()) };
     let extent = high.distance(low);
     let touch = TOUCH * extent;
     let mut planes = Planes::new(extent, touch);
     let mut panels = panels(enclosure, &mut planes);
     let solids = find_solids(&mut panels, touch);
-    let parts = enclosure.facets.iter().enumerate().flat_map(|(i, facet)| Part::of(i as u32, facet)).collect();
+    let exposed = exposed(enclosure, &mut planes, touch);
+    let parts_of = |(i, facet): (usize, &Facet)| match &exposed[i] {
+        None => Part::of(i as u32, facet),
+        Some(pieces) => pieces.iter().flat_map(|piece| Part::of(i as u32, piece)).collect(),
+    };
+    let parts = enclosure.facets.iter().enumerate().flat_map(parts_of).collect();
     let clusters = Clusters::new(parts, &mut planes);
     let blocks = clusters.blocks(BLOCK.min(clusters.parts.len() / BLOCKS).max(LEAF));
     let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));

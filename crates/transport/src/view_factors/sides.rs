@@ -181,14 +181,10 @@ impl Sides {
         &self.sides[side as usize].seen
     }
 
-    /// A convex polygon of a size (m) in the region as it is, if it is a parallelogram and no plane of a face crosses it.
-    pub fn uncut(&mut self, (from, size): (&[DVec3], f64), bodies: &[Body], setting: Setting) -> Option<Piece> {
-        let frames = Frame::of(from);
-        let [frame] = frames[..] else { return None };
-        if !frame.is_square || self.faces.iter().any(|(_, face)| is_crossed(from, *face, size)) {
-            return None;
-        }
-        Some(Piece { frame, side: self.side(from, size, bodies, setting) as u16 })
+    /// A convex polygon of a size (m) in the region as it is, whatever planes of faces cross it.
+    pub fn uncut(&mut self, (from, size): (&[DVec3], f64), bodies: &[Body], setting: Setting) -> SmallVec<[Piece; 4]> {
+        let side = self.side(from, size, bodies, setting) as u16;
+        Frame::of(from).into_iter().map(|frame| Piece { frame, side }).collect()
     }
 
     /// Cuts a convex polygon of a size (m) in the region by the planes of faces that cross it, if they are not those of a mesh, and

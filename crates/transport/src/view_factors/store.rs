@@ -19,6 +19,36 @@ impl Entry {
     pub fn new(a: u32, b: u32, exchange: Exchange) -> Entry {
         Entry { pair: [a.min(b), a.max(b)], value: exchange.value, error: round_up(exchange.error) }
     }
+
+    pub fn pair(&self) -> [u32; 2] {
+        self.pair
+    }
+
+    pub fn error(&self) -> f64 {
+        f64::from(self.error)
+    }
+}
+
+/// Share of stated errors that add up as they are; the rest does so in squares.
+const ALIKE: f64 = 0.1;
+
+/// Stated errors of what is summed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Errors {
+    sum: f64,
+    squares: f64,
+}
+
+impl Errors {
+    pub fn add(&mut self, error: f64) {
+        self.sum += error;
+        self.squares += error * error;
+    }
+
+    /// The error of the sum.
+    pub fn together(self) -> f64 {
+        self.sum.min(self.squares.sqrt() + ALIKE * self.sum)
+    }
 }
 
 /// Where the entries of each key below n begin, of all in the order of the key.
@@ -199,14 +229,14 @@ impl ViewFactors {
     /// The factors between the surfaces that facets belong to: exchange areas sum up.
     pub fn by_surface(&self, enclosure: &Enclosure) -> ViewFactors {
         let n = enclosure.surfaces.len();
-        let mut rows: Vec<std::collections::BTreeMap<u32, (f64, f64)>> = vec![Default::default(); n];
+        let mut rows: Vec<std::collections::BTreeMap<u32, (f64, Errors)>> = vec![Default::default(); n];
         for (i, j, value, error) in self.entries() {
             let (a, b) = (enclosure.surface_of[i], enclosure.surface_of[j]);
             // A pair within one surface counts from either side.
             let times = if a == b && i != j { 2.0 } else { 1.0 };
             let sum = rows[a.min(b) as usize].entry(a.max(b)).or_default();
             sum.0 += times * value;
-            sum.1 += times * error;
+            sum.1.add(times * error);
         }
         let mut of = ViewFactors {
             areas: enclosure.surface_areas(),
@@ -215,10 +245,10 @@ impl ViewFactors {
             ..Default::default()
         };
         for row in rows {
-            for (column, (value, error)) in row {
+            for (column, (value, errors)) in row {
                 of.columns.push(column);
                 of.values.push(value);
-                of.errors.push(round_up(error));
+                of.errors.push(round_up(errors.together()));
             }
             of.starts.push(of.columns.len());
         }

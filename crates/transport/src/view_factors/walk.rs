@@ -24,9 +24,11 @@ use std::ops::Range;
 /// Error of the unoccluded factor relative to that of the visible one, where it only serves to find that.
 const WHOLE: f64 = 0.05;
 
-/// Least share of the accuracy that a pair of facets is asked for, where surfaces have many: their errors hardly add
-/// up.
+/// Least share of the accuracy that a pair of parts is asked for, where facets have many: their errors hardly add up.
 const LEAST: f64 = 0.1;
+
+/// Share of the accuracy that the errors of pairs of facets may have in squares, where surfaces have several: what is left is for what they have alike.
+const IN_SQUARES: f64 = 0.6;
 
 /// Panels, by index.
 type List = SmallVec<[u32; 16]>;
@@ -298,13 +300,19 @@ impl<'a> Walk<'a> {
         parts.for_each(|part| self.pair(part, &mut target));
     }
 
-    /// Error of A_i F_ij that two parts may have: their share of what their surfaces may, m².
+    /// Error of A_i F_ij that two parts may have, m²: their share of what their facets may. Those may as much as if they were surfaces of their
+    /// own, or their share in squares of what their surfaces may, if that is less ([`Errors`](super::store::Errors)).
     fn tolerance(&self, a: &Part, b: &Part) -> f64 {
-        let (area, other) = (a.shape.area(), b.shape.area());
+        let area = |part: &Part| self.enclosure.facets[part.facet as usize].area();
+        let (facets, parts) = ([area(a), area(b)], [a.shape.area(), b.shape.area()]);
         let [i, j] = [a, b].map(|part| self.enclosure.surface_of[part.facet as usize]);
-        let of_surface = self.areas[i as usize].max(self.areas[j as usize]);
+        let surfaces = [i, j].map(|surface| self.areas[surface as usize]);
+        let product = |of: [f64; 2]| of[0] * of[1];
         let times = if i == j { 2.0 } else { 1.0 };
-        self.options.accuracy * (area * other / (times * of_surface)).max(LEAST * area.min(other))
+        let in_squares = (product(facets) / (times * product(surfaces))).sqrt() * least(surfaces);
+        let of_facets = if facets == surfaces { in_squares } else { IN_SQUARES * in_squares };
+        let share = product(parts) / product(facets);
+        self.options.accuracy * (share * of_facets).max(LEAST * least(parts))
     }
 
     /// What two parts exchange if nothing stands between, and the error that what is left of it past panels may have: the whole is asked
@@ -369,6 +377,10 @@ impl<'a> Walk<'a> {
             self.entries.push(Entry::new(a.facet, b.facet, exchange));
         }
     }
+}
+
+fn least([a, b]: [f64; 2]) -> f64 {
+    a.min(b)
 }
 
 /// Pairs (i, j) with i < j from two ranges, of which the first is not after the second.

@@ -97,7 +97,7 @@ pub(super) fn facet_row(medium: &Medium, area: f64, i: usize, faced: &[(u32, f64
             let [u, v, x, y] = sequence.point(index as u32).map(f64::from);
             let place = own.centroid() + inwards * (places.at(x, y) - own.centroid());
             let direction = cosine_direction(&frame, u, v);
-            let (item, end) = medium.around.meets(place, direction, &ignored);
+            let (item, end) = medium.around.meets(place, direction, |facet| ignored[facet]);
             let left = medium.follow(&mut line, (place, direction), [0.0, end], None, 1.0);
             taken.extend_from_slice(&line.taken);
             ends.push((item as u32, left, taken.len()));
@@ -189,8 +189,8 @@ pub(super) fn zone_row(medium: &Medium, k: usize, known: &[(f64, f64)], aim: Aim
             let depth = kappa * end.max(0.0);
             emitted += depth;
             stays += kept(depth);
-            let ignored = face.map_or(&[][..], |f| &ignored[f]);
-            let (item, far) = medium.around.meets(place, direction, ignored);
+            let is_ignored = |facet: usize| face.is_some_and(|f| ignored[f][facet]);
+            let (item, far) = medium.around.meets(place, direction, is_ignored);
             let left = medium.follow(&mut line, (place, direction), [end, far.max(end)], Some(k), -(-depth).exp_m1());
             line.taken.iter().for_each(|(k, taken)| row[nothing + *k as usize] += taken);
             if item < nothing {
