@@ -7,6 +7,7 @@
 
 use super::panel::{Planes, convex_pieces};
 use crate::row::around::Around;
+use crate::row::points::is_coplanar;
 use glam::DVec3;
 use i_triangle::i_overlay::core::fill_rule::FillRule;
 use i_triangle::i_overlay::core::overlay_rule::OverlayRule;
@@ -81,12 +82,13 @@ pub fn exposed(enclosure: &Enclosure, planes: &mut Planes, touch: f64) -> Vec<Op
 
 /// Whether all that rays from a place on a facet tell is that they meet backs.
 fn looks_into_a_body(around: &Around, has_twin: &[bool], own: &Facet, place: DVec3) -> bool {
-    let (own_plane, frame) = (around.in_plane_of(own), frame(own.normal()));
+    let is_own = |facet: usize| is_coplanar(own, around.enclosure.facets[facet].corners().iter().copied());
+    let frame = frame(own.normal());
     let sequence = Sequence::new(0, STREAM);
     let mut backs = 0;
     for index in 0..RAYS {
         let [u, v, ..] = sequence.point(index).map(f64::from);
-        match around.first(place, cosine_direction(&frame, u, v), |facet| own_plane[facet]) {
+        match around.first(place, cosine_direction(&frame, u, v), is_own) {
             Some((_, hit)) if hit.back => backs += 1,
             Some((facet, _)) if has_twin.get(facet).copied().unwrap_or(false) => {}
             _ => return false,
