@@ -37,7 +37,8 @@ pub fn exposed(enclosure: &Enclosure, planes: &mut Planes, touch: f64) -> Vec<Op
         sides[plane as usize][usize::from(along)].push(k);
     }
     let mut overlaps: Vec<(usize, Flat, Shapes)> = Vec::new();
-    for (plane, [against, along]) in sides.iter().enumerate() {
+    let both = |[against, along]: &[Vec<usize>; 2]| !against.is_empty() && !along.is_empty();
+    for (plane, [against, along]) in sides.iter().enumerate().filter(|(_, sides)| both(sides)) {
         for (own, others) in [(against, along), (along, against)] {
             let flat = Flat::new(planes.plane(plane as u32));
             let outlines = |of: &[usize]| of.iter().map(|k| flat.outline(&enclosure.facets[*k])).collect::<Vec<_>>();

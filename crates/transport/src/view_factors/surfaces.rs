@@ -33,8 +33,12 @@ const MOST: usize = 1 << 31;
 /// Sets of rays that know nothing of each other, each a sequence of its own: they tell how far a surface's factors are off, if those are few, too.
 const SETS: usize = 16;
 
-/// Rays of one task at most.
+/// Rays of one task at most, and tasks whose hits are kept until they are counted.
 const TASK: usize = 1 << 12;
+const BATCH: usize = 1 << 10;
+
+/// Bytes for a factor in one direction: its counts, it and its error, and half of what is stored of a pair.
+const ROOM: usize = SETS * size_of::<u32>() + size_of::<Factor>() + (size_of::<Entry>() + BYTES) / 2;
 
 /// Where this is asked for, a pair of facets takes about as long for each panel that may stand between as below, and a ray, s; and a surface
 /// needs about as many rays. By furniture of 300 to 6,000 facets.
@@ -77,7 +81,7 @@ fn takes_less_by_rays(enclosure: &Enclosure, options: &ViewFactorOptions) -> boo
     let finer = ACCURACY / options.accuracy;
     let rays = RAYS * finer.powf(RAYS_GROW);
     let is_possible = rays <= MOST as f64
-        && (surfaces * (surfaces + 1) / 2).saturating_mul(BYTES) <= options.memory
+        && surfaces.saturating_mul(surfaces).saturating_mul(ROOM) <= options.memory
         && enclosure.surface_areas().iter().all(|area| *area > 0.0);
     let panels = || panels(enclosure, &mut Planes::new(extent, TOUCH * extent)).len();
     let by_pairs = || PAIR * 0.5 * (facets as f64).powi(2) * panels() as f64 * finer.powf(PAIR_GROWS);
@@ -155,16 +159,20 @@ impl<'a> Rays<'a> {
         let scene = (&self.around, &self.exposed[..]);
         for (k, source) in self.sources.iter_mut().enumerate() {
             let [from, to] = [source.counted / SETS, source.rays / SETS];
+            let Source { places, facets, counts, .. } = source;
+            let from_all_over = (&*places, &facets[..]);
             let task = |&(set, first): &(usize, usize)| {
                 let range = first..to.min(first + TASK);
                 let done = done.fetch_add(range.len(), Ordering::Relaxed) + range.len();
                 let sequence = Sequence::new(hash(hash(set as u32) ^ k as u32), STREAM);
-                progress.step(done, expected).then(|| meet(scene, source, &sequence, range)).ok_or(Stopped)
+                progress.step(done, expected).then(|| meet(scene, from_all_over, &sequence, range)).ok_or(Stopped)
             };
             let tasks: Vec<_> = (0..SETS).flat_map(|set| (from..to).step_by(TASK).map(move |i| (set, i))).collect();
-            let met: Vec<Vec<[u32; 2]>> = tasks.par_iter().map(task).collect::<Result<_, _>>()?;
-            for ((set, _), met) in tasks.iter().zip(met) {
-                met.into_iter().for_each(|[item, times]| source.counts.add(item as usize, *set, times));
+            for batch in tasks.chunks(BATCH) {
+                let met: Vec<Vec<[u32; 2]>> = batch.par_iter().map(task).collect::<Result<_, _>>()?;
+                for ((set, _), met) in batch.iter().zip(met) {
+                    met.into_iter().for_each(|[item, times]| counts.add(item as usize, *set, times));
+                }
             }
             source.counted = source.rays;
         }
@@ -173,23 +181,23 @@ impl<'a> Rays<'a> {
 
     /// The exchange areas of all pairs, by the rays of either surface: their variances are as A_i/M_i.
     fn entries(&self) -> Vec<Entry> {
-        let rows: Vec<RowFactors> = self.sources.iter().map(|source| source.counts.row(source.rays)).collect();
+        let row = |source: &Source| (source.rays > 0).then(|| source.counts.row(source.rays));
+        let rows: Vec<Option<RowFactors>> = self.sources.iter().map(row).collect();
         let told = |i: usize, j: usize| {
-            let (Factor { value, error }, Source { area, rays, .. }) = (rows[i].factors[j], &self.sources[i]);
-            (*rays as f64 / area, area * value, area * error)
+            let (Factor { value, error }, Source { area, rays, .. }) = (rows[i].as_ref()?.factors[j], &self.sources[i]);
+            Some((*rays as f64 / area, area * value, area * error))
         };
-        let entry = |i: usize, j: usize| {
-            if self.sources[i].rays == 0 || self.sources[j].rays == 0 {
-                return Entry::new(i as u32, j as u32, Exchange::default());
+        let exchange = |i: usize, j: usize| match (told(i, j), told(j, i)) {
+            (Some((_, value, error)), _) if i == j => Exchange { value, error },
+            (Some((w, value, error)), Some((v, other, other_error))) => {
+                let value = (w * value + v * other) / (w + v);
+                Exchange { value, error: (w * error).hypot(v * other_error) / (w + v) }
             }
-            let ((w, value, error), (v, other, other_error)) = (told(i, j), told(j, i));
-            let (value, error) = match i == j {
-                true => (value, error),
-                false => ((w * value + v * other) / (w + v), (w * error).hypot(v * other_error) / (w + v)),
-            };
-            Entry::new(i as u32, j as u32, Exchange { value, error })
+            // One of them is covered.
+            _ => Exchange::default(),
         };
-        (0..rows.len()).flat_map(|i| (i..rows.len()).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect()
+        let pairs = (0..rows.len()).flat_map(|i| (i..rows.len()).map(move |j| (i, j)));
+        pairs.map(|(i, j)| Entry::new(i as u32, j as u32, exchange(i, j))).collect()
     }
 
     /// Twice the rays for the smaller surface of each pair that is not as exact as asked: they tell most for their number. Whether there are any.
@@ -218,7 +226,7 @@ fn holds(facet: &Facet, place: DVec3) -> bool {
 /// where these go through others.
 fn meet(
     (around, exposed): (&Around, &[Option<Vec<Facet>>]),
-    source: &Source,
+    (places, facet_of): (&Places, &[u32]),
     sequence: &Sequence,
     range: Range<usize>,
 ) -> Vec<[u32; 2]> {
@@ -226,8 +234,8 @@ fn meet(
     let mut items: Vec<u32> = range
         .map(|index| {
             let [u, v, x, y] = sequence.point(index as u32).map(f64::from);
-            let (triangle, place) = source.places.find(x, y);
-            let own = &facets[source.facets[triangle] as usize];
+            let (triangle, place) = places.find(x, y);
+            let own = &facets[facet_of[triangle] as usize];
             let direction = cosine_direction(&frame(own.normal()), u, v);
             let place = own.centroid() + around.inwards(own.radius()) * (place - own.centroid());
             let is_own = |facet: usize| is_coplanar(own, facets[facet].corners().iter().copied());
@@ -317,6 +325,21 @@ mod tests {
             let truth = exact.factor(i, j).value * exact.areas()[i];
             assert!((value - truth).abs() <= 1.2 * error, "{i} {j}: {value} ± {error} of {truth}");
         }
+    }
+
+    /// Pads on a board, their faces turned into it.
+    #[test]
+    fn surfaces_that_are_covered_see_nothing() {
+        let mut scene = box_of(DVec3::splat(2.0), 1);
+        add_box(&mut scene, DVec3::splat(0.5), DVec3::new(1.5, 1.5, 0.7));
+        let pad = [[0.0, 0.0], [0.0, 0.1], [0.1, 0.1], [0.1, 0.0]].map(|[x, y]| DVec3::new(0.6 + x, 0.6 + y, 0.7));
+        let pad = |k: usize| pad.map(|corner| corner + 0.12 * k as f64 * DVec3::X);
+        (0..6).for_each(|k| scene.add("pad", Facet::new(pad(k).to_vec()).unwrap()));
+        let scene = grouped(scene, 6);
+        let exact = view_factors(&scene, &asked(1e-4), &()).unwrap().by_surface(&scene);
+        let found = by_rays(&scene, 1e-2);
+        assert_eq!([&exact, &found].map(|of| of.row_sums()[2]), [0.0; 2]);
+        assert!([&exact, &found].iter().all(|of| of.factor(1, 0).value > 0.9));
     }
 
     /// Patches of walls go pair by pair, a mesh goes by rays, but where more is asked than rays can.
