@@ -223,7 +223,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         refuse_long_names(&input.enclosure)?;
     }
     progress.parts();
-    let found = radiosity::factors(&input.enclosure, &arguments.options(&input.enclosure), progress)?;
+    let options = arguments.options(&input.enclosure);
+    let found = radiosity::factors(&input.enclosure, &options, progress)?;
     let table = Table::new(&input, &found, (emittances, is_script_f), arguments.memory)?;
 
     if let (Some(path), Some(format)) = (&arguments.output, format) {
@@ -236,7 +237,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         return print(&event(arguments, &input, &found, &table, progress).to_string());
     }
     if !global.quiet {
-        for line in summary(&input, &found, &table, arguments) {
+        for line in summary(&input, &found, &table, (arguments, &options)) {
             progress.say(&line);
         }
     }
@@ -481,7 +482,12 @@ fn warnings(input: &Input, found: &Factors) -> Vec<String> {
     lines
 }
 
-fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments) -> Vec<String> {
+fn summary(
+    input: &Input,
+    found: &Factors,
+    table: &Table,
+    (arguments, options): (&Arguments, &FactorsOptions),
+) -> Vec<String> {
     let enclosure = &input.enclosure;
     let mut head = format!(
         "{}: {}, {}",
@@ -496,8 +502,10 @@ fn summary(input: &Input, found: &Factors, table: &Table, arguments: &Arguments)
     lines.extend(input.vs3.iter().flat_map(|vs3| rows_of_vs3(vs3, enclosure, table.is_script_f)));
     let choices = found.factors.choices;
     if let Some(rays) = choices.map(|c| c.rays).filter(|rays| *rays > 0) {
-        let usual = if arguments.accuracy.is_none() { ", until factors are good to 1e-3 (--accuracy)" } else { "" };
-        lines.push(format!("{rays} rays from all over surfaces, as pairs of facets take longer{usual}"));
+        let accuracy = options.form.adaptive.accuracy;
+        lines.push(format!(
+            "{rays} rays from all over surfaces, as pairs of facets take longer; asked for {accuracy:e} (--accuracy)"
+        ));
     } else if let Some(c) = choices {
         let cubature: usize = c.clear_cubature.iter().sum();
         lines.push(format!(

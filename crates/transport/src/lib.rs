@@ -9,6 +9,7 @@ mod block;
 pub mod direct;
 mod eclipse;
 pub mod exposure;
+mod flat;
 pub mod form_factors;
 pub mod gather;
 mod glance;

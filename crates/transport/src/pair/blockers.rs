@@ -219,7 +219,7 @@ fn contains(corners: &[DVec3], p: DVec3, [x, y]: [usize; 2]) -> bool {
 }
 
 /// Whether the facet contains a point of its plane.
-pub(super) fn is_inside(facet: &Facet, point: DVec3) -> bool {
+pub(crate) fn is_inside(facet: &Facet, point: DVec3) -> bool {
     let axis = widest(facet.normal().abs());
     contains(facet.corners(), point, [(axis + 1) % 3, (axis + 2) % 3])
 }

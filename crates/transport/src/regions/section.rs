@@ -5,6 +5,7 @@
 //! (solid walls, furniture, the outside of a building) is nobody's, and an opening needs somebody on both sides.
 
 use super::polygon::{Place, Plane, area, middle};
+use crate::flat::{Contour, Flat, Shape, shape_area, twice_area};
 use crate::view_factors::convex_pieces;
 use glam::{DVec2, DVec3, Vec3};
 use i_triangle::i_overlay::core::fill_rule::FillRule;
@@ -16,9 +17,6 @@ use radiosity_trace::{Ray, Tree};
 /// Rays to either side of an opening that look for a front of a facet. A place that sees none with 64 sees fronts in
 /// some 5 % of its directions at most; in what is not sealed it sees half its surroundings, and more rays find no more.
 const LOOKS: usize = 64;
-
-type Contour = Vec<[f64; 2]>;
-type Shape = Vec<Contour>;
 
 /// An opening of a plane, in convex polygons, counter-clockwise about the plane's normal.
 #[derive(Clone, Debug)]
@@ -80,26 +78,9 @@ impl Space {
     }
 }
 
-/// Coordinates in a plane.
-struct Flat {
-    origin: DVec3,
-    x: DVec3,
-    y: DVec3,
-}
-
-impl Flat {
-    fn new(plane: &Plane, near: DVec3) -> Flat {
-        let (x, y) = plane.normal.any_orthonormal_pair();
-        Flat { origin: near - plane.height(near) * plane.normal, x, y }
-    }
-
-    fn flat(&self, p: DVec3) -> [f64; 2] {
-        [self.x.dot(p - self.origin), self.y.dot(p - self.origin)]
-    }
-
-    fn back(&self, p: [f64; 2]) -> DVec3 {
-        self.origin + p[0] * self.x + p[1] * self.y
-    }
+/// Coordinates in a plane about the place on it that is nearest to another.
+fn on(plane: &Plane, near: DVec3) -> Flat {
+    Flat::new(plane.normal, near - plane.height(near) * plane.normal)
 }
 
 /// Panels as a plane meets them.
@@ -159,15 +140,6 @@ fn line(plane: &Plane, flat: &Flat, corners: &[DVec3], touch: f64) -> Option<Con
     (a.distance(b) > touch).then(|| vec![flat.flat(a - along), flat.flat(b + along)])
 }
 
-fn twice_area(contour: &[[f64; 2]]) -> f64 {
-    let n = contour.len();
-    (0..n).map(|i| (contour[i], contour[(i + 1) % n])).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
-}
-
-fn shape_area(shape: &Shape) -> f64 {
-    0.5 * shape.iter().map(|contour| twice_area(contour)).sum::<f64>()
-}
-
 /// Half the width of a line, relative to `touch`: far above the rounding of coordinates, far below what is known of
 /// them.
 const LINE: f64 = 0.01;
@@ -217,7 +189,7 @@ fn tidy(contour: &mut Contour, width: f64) {
 /// The polygon that a plane cuts out of a convex cell, the intersection of half-spaces n · x ≤ d.
 fn outline(plane: &Plane, cell: &[Plane], bounds: [DVec3; 2], touch: f64) -> Vec<DVec3> {
     let (middle, reach) = (0.5 * (bounds[0] + bounds[1]), bounds[0].distance(bounds[1]));
-    let flat = Flat::new(plane, middle);
+    let flat = on(plane, middle);
     let mut corners: Vec<DVec3> =
         [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]: [f64; 2]| flat.back([x * reach, y * reach])).into();
     for side in cell {
@@ -243,7 +215,7 @@ pub fn section<'a>(
     if corners.is_empty() {
         return found;
     }
-    let flat = Flat::new(plane, middle(&corners));
+    let flat = on(plane, middle(&corners));
     let met = Met::new(plane, &flat, panels, space.touch);
     // Lines that end in a field part it only together with those that end at the plane.
     let lines: Vec<Contour> = met.through.iter().chain(&met.ends).cloned().collect();

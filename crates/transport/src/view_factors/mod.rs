@@ -55,7 +55,7 @@ use walk::Walk;
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFactorOptions {
     /// Bound asked for the error of F_ij between surfaces that see each other partly. Pairs of facets of such surfaces share it
-    /// in squares, as their errors hardly add up.
+    /// in squares, as their errors hardly add up. Where many take all of their share it may be missed, which the stated errors tell.
     pub accuracy: f64,
     /// The same for those that see each other whole.
     pub clear_accuracy: f64,

@@ -4,6 +4,7 @@
 //! (active side or not, they are opaque from both) and the union is cut into convex pieces, so that the question
 //! whether anything stands between two facets is asked a few times and not a few hundred.
 
+use crate::flat::Flat;
 use glam::{DVec2, DVec3};
 use i_triangle::float::triangulatable::Triangulatable;
 use i_triangle::i_overlay::core::fill_rule::FillRule;
@@ -186,13 +187,11 @@ fn straighten(contour: &mut Vec<[f64; 2]>, touch: f64) {
 
 /// Convex polygons that cover what the facets of one plane cover, counter-clockwise about `normal`.
 pub fn united(facets: &[&Facet], normal: DVec3, touch: f64) -> Vec<Vec<DVec3>> {
-    let origin = facets[0].corners()[0];
-    let (x, y) = normal.any_orthonormal_pair();
-    let flat = |p: DVec3| [x.dot(p - origin), y.dot(p - origin)];
+    let flat = Flat::new(normal, facets[0].corners()[0]);
     let contours: Vec<Vec<[f64; 2]>> = facets
         .iter()
         .map(|facet| {
-            let mut contour: Vec<_> = facet.corners().iter().map(|c| flat(*c)).collect();
+            let mut contour: Vec<_> = facet.corners().iter().map(|c| flat.flat(*c)).collect();
             if facet.normal().dot(normal) < 0.0 {
                 contour.reverse();
             }
@@ -200,8 +199,7 @@ pub fn united(facets: &[&Facet], normal: DVec3, touch: f64) -> Vec<Vec<DVec3>> {
         })
         .collect();
     let union = contours.simplify_shape_as::<i64>(FillRule::NonZero);
-    let back = |p: [f64; 2]| origin + p[0] * x + p[1] * y;
-    convex_pieces(union, touch).into_iter().map(|piece| piece.into_iter().map(back).collect()).collect()
+    convex_pieces(union, touch).into_iter().map(|piece| piece.into_iter().map(|p| flat.back(p)).collect()).collect()
 }
 
 /// Shapes, outlines and holes, cut into convex polygons, counter-clockwise. Corners within `touch` of the line between their

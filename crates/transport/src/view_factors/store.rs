@@ -29,12 +29,14 @@ impl Entry {
     }
 }
 
-/// Share of stated errors that add up as they are; the rest does so in squares.
+/// Share of stated errors that add up as they are, and their squares do besides: furniture that is cut coarsely comes out too low by 0.3 to 9 %
+/// of the plain sum, the more the less is asked. With none errors of surfaces of thousands of pairs would be stated too small, with all
+/// of them they would be a hundred times what they are.
 const ALIKE: f64 = 0.1;
 
 /// Stated errors of what is summed.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Errors {
+pub(super) struct Errors {
     sum: f64,
     squares: f64,
 }
