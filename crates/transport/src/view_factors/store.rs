@@ -30,9 +30,10 @@ impl Entry {
 }
 
 /// Share of stated errors that add up as they are, and their squares do besides: furniture that is cut coarsely comes out too low by 0.3 to 9 %
-/// of the plain sum, the more the less is asked. With none errors of surfaces of thousands of pairs would be stated too small, with all
+/// of the plain sum, the more the less is asked, and patches of walls see the same edge fall alike: with 0.1 one of 1,828 errors in a room with boxes is
+/// too small, by a factor of 1.13, with 0.2 the worst is 0.87 times what is stated. With none errors of surfaces of thousands of pairs would be stated too small, with all
 /// of them they would be a hundred times what they are.
-const ALIKE: f64 = 0.1;
+const ALIKE: f64 = 0.2;
 
 /// Stated errors of what is summed.
 #[derive(Clone, Copy, Debug, Default)]

@@ -28,8 +28,8 @@ const WHOLE: f64 = 0.05;
 const LEAST: f64 = 0.1;
 
 /// Share of the accuracy that the errors of pairs of facets may have in squares, where surfaces have several. What is left is for what
-/// they have alike, and enough if 40 pairs take all of theirs; of thousands nearly all take far less.
-const IN_SQUARES: f64 = 0.6;
+/// they have alike, and enough if 25 pairs take all of theirs; of thousands nearly all take far less.
+const IN_SQUARES: f64 = 0.5;
 
 /// Panels, by index.
 type List = SmallVec<[u32; 16]>;

@@ -374,6 +374,24 @@ fn surfaces_of_facets_are_as_exact_as_asked() {
     }
 }
 
+/// Errors of surfaces add up in squares for the most part: what is stated holds what is, for few facets a surface and for many.
+#[test]
+fn errors_of_surfaces_of_facets_hold() {
+    for facets in [2, 4, 12, 36] {
+        let mut scene = obstructed_room(4);
+        scene.surface_of.iter_mut().for_each(|surface| *surface /= facets);
+        scene.surfaces.truncate(scene.facets.len().div_ceil(facets as usize));
+        for accuracy in [1e-2, 1e-3] {
+            let [found, truth] = [accuracy, 0.02 * accuracy].map(|asked| solve(&scene, asked).by_surface(&scene));
+            for (i, j, value, error) in found.entries() {
+                let (truth, area) = (truth.factor(i, j), found.areas()[i]);
+                let off = (value - truth.value * area).abs() - truth.error * area;
+                assert!(off <= error + 1e-12, "{facets} a surface, {accuracy}: {i} {j} off by {off}, stated {error}");
+            }
+        }
+    }
+}
+
 /// A wall between two rooms has a side in each: neither is hidden by the wall itself, and no light gets through.
 #[test]
 fn rooms_on_either_side_of_a_wall_are_closed() {
