@@ -3,14 +3,16 @@
 //!
 //! LU with partial pivoting solves (I − R F) B = E as it stands. Cholesky takes the symmetric form (catalogue 8),
 //! (A_i/ρ_i) B_i − Σ_j A_i F_ij B_j = A_i E_i/ρ_i, at half the cost; black unknowns, known beforehand, go to the
-//! right-hand side. Both need N³ time for each band, N/3 and N/6 applications of F, and 24 N² and 16 N² bytes at most
-//! ([`crate::Solver::matrix_bytes`]); they serve as the oracle of all others. A start is of no use to them. The factors
-//! are faer's.
+//! right-hand side. Both need N³ time for each band, N/3 and N/6 applications of F, and 8 N² bytes
+//! ([`crate::Solver::matrix_bytes`]); they serve as the oracle of all others. A start is of no use to them. Factors of
+//! panels, and products of matrices, are nalgebra's.
 
 use crate::gauge::{Gauge, is_done};
 use crate::{Go, Info, Params, Response, Rows, SolveError, Space};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use nalgebra::DMatrix;
+
+/// Columns whose pivots are found one by one; whatever is beside them follows in one product of matrices.
+const PANEL: usize = 64;
 
 /// LU factors with partial pivoting; `b` receives the result.
 ///
@@ -32,15 +34,15 @@ pub fn lu<T: Rows>(
     let rho = sheets.reflectance;
     let (bands, n) = (response.bands(), transport.space().dim());
     for band in 0..bands {
-        let mut matrix = Mat::<f64>::identity(n, n);
+        let mut matrix = DMatrix::<f64>::identity(n, n);
         for i in 0..n {
             transport.row(i, |j, factor| matrix[(i, j)] -= rho[i * bands + band] * factor);
             if let Some((other, tau)) = sheets.passed(i, bands) {
                 transport.row(other, |j, factor| matrix[(i, j)] -= tau[band] * factor);
             }
         }
-        let mut x = Mat::from_fn(n, 1, |i, _| e[i * bands + band]);
-        eliminate(&matrix, &mut x);
+        let mut x = DMatrix::from_fn(n, 1, |i, _| e[i * bands + band]);
+        eliminate(matrix, &mut x);
         for i in 0..n {
             b[i * bands + band] = x[(i, 0)];
         }
@@ -74,8 +76,8 @@ pub fn cholesky<T: Rows>(
         for (k, i) in bright.iter().enumerate() {
             place[*i] = k;
         }
-        let mut matrix = Mat::<f64>::zeros(bright.len(), bright.len());
-        let mut x = Mat::<f64>::zeros(bright.len(), 1);
+        let mut matrix = DMatrix::<f64>::zeros(bright.len(), bright.len());
+        let mut x = DMatrix::<f64>::zeros(bright.len(), 1);
         for (k, &i) in bright.iter().enumerate() {
             let (at, area) = (i * bands + band, weight[i * bands + band] * rho[i * bands + band]);
             matrix[(k, k)] = weight[at];
@@ -85,7 +87,9 @@ pub fn cholesky<T: Rows>(
                 place => matrix[(k, place)] -= area * factor,
             });
         }
-        eliminate_symmetric(&matrix, &mut x)?;
+        if !eliminate_symmetric(matrix, &mut x) {
+            return Err(SolveError::NotApplicable("the symmetric form is not positive definite; use lu"));
+        }
         for i in 0..n {
             let at = i * bands + band;
             b[at] = if place[i] == usize::MAX { e[at] } else { x[(place[i], 0)] };
@@ -94,18 +98,51 @@ pub fn cholesky<T: Rows>(
     finish(transport, response, e, b, params, n as f64 / 6.0, step)
 }
 
-/// Solves for the columns of `x` in place. (That faer is called from what is not generic spares callers' crates its translation.)
-pub(crate) fn eliminate(matrix: &Mat<f64>, x: &mut Mat<f64>) {
-    matrix.partial_piv_lu().solve_in_place(x);
+/// Solves for the columns of `x` in place: panel by panel of the matrix, by partial pivoting (Golub and Van Loan 2013,
+/// sect. 3.4.7). Of a matrix that is singular nothing finite comes.
+pub(crate) fn eliminate(mut matrix: DMatrix<f64>, x: &mut DMatrix<f64>) {
+    let n = matrix.nrows();
+    for start in (0..n).step_by(PANEL) {
+        let end = n.min(start + PANEL);
+        let panel = matrix.view_range(start.., start..end).into_owned().lu();
+        let factors = panel.lu_internal();
+        matrix.view_range_mut(start..end, start..end).copy_from(&factors.rows(0, end - start));
+        for mut beside in [matrix.view_range_mut(start.., end..), x.rows_range_mut(start..)] {
+            panel.p().permute_rows(&mut beside);
+            let (mut above, mut below) = beside.rows_range_pair_mut(..end - start, end - start..);
+            factors.rows(0, end - start).solve_lower_triangular_with_diag_mut(&mut above, 1.0);
+            below.gemm(-1.0, &factors.rows_range(end - start..), &above, 1.0);
+        }
+    }
+    if !matrix.solve_upper_triangular_mut(x) {
+        x.fill(f64::NAN);
+    }
 }
 
-/// The same with a matrix that is symmetric and positive definite.
-fn eliminate_symmetric(matrix: &Mat<f64>, x: &mut Mat<f64>) -> Result<(), SolveError> {
-    let Ok(factors) = matrix.llt(Side::Lower) else {
-        return Err(SolveError::NotApplicable("the symmetric form is not positive definite; use lu"));
-    };
-    factors.solve_in_place(x);
-    Ok(())
+/// The same of a matrix that is symmetric, of which only what is on and below the diagonal is looked at; whether it is
+/// positive definite, without which `x` is spoilt.
+fn eliminate_symmetric(mut matrix: DMatrix<f64>, x: &mut DMatrix<f64>) -> bool {
+    let n = matrix.nrows();
+    for start in (0..n).step_by(PANEL) {
+        let end = n.min(start + PANEL);
+        let Some(factor) = matrix.view_range(start..end, start..end).into_owned().cholesky() else { return false };
+        let factor = factor.unpack();
+        // The rows below are solved for as columns, and every block of columns of what is left takes its product with them.
+        let mut across = matrix.view_range(end.., start..end).transpose();
+        factor.solve_lower_triangular_mut(&mut across);
+        let below = across.transpose();
+        for left in (end..n).step_by(PANEL) {
+            let right = n.min(left + PANEL);
+            let columns = across.columns_range(left - end..right - end);
+            matrix.view_range_mut(left.., left..right).gemm(-1.0, &below.rows_range(left - end..), &columns, 1.0);
+        }
+        let (mut above, mut rest) = x.rows_range_pair_mut(start..end, end..);
+        factor.solve_lower_triangular_mut(&mut above);
+        rest.gemm(-1.0, &below, &above, 1.0);
+        matrix.view_range_mut(start..end, start..end).copy_from(&factor);
+        matrix.view_range_mut(end.., start..end).copy_from(&below);
+    }
+    matrix.tr_solve_lower_triangular_mut(x)
 }
 
 /// Measures what elimination left, by one application.
@@ -127,4 +164,44 @@ fn finish<T: Rows>(
         return Ok(info);
     }
     Err(SolveError::NotConverged { info: Box::new(info), asked: params.tolerance })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Panels of all widths, with pivots that are not where they stand, against elimination in one piece.
+    #[test]
+    fn panels_give_what_one_piece_gives() {
+        for n in [1, 2, PANEL - 1, PANEL, PANEL + 1, 3 * PANEL + 7] {
+            let random = |i: usize, j: usize| ((i * 7919 + j * 104_729 + 13) % 1009) as f64 / 1009.0 - 0.5;
+            let matrix = DMatrix::from_fn(n, n, |i, j| random(i, j) + f64::from(u8::from(i + j + 1 == n)));
+            let given = DMatrix::from_fn(n, 3, |i, j| random(j, i + 5));
+            let mut found = given.clone();
+            eliminate(matrix.clone(), &mut found);
+            let expected = matrix.lu().solve(&given).unwrap();
+            assert!((&found - &expected).amax() < 1e-10 * expected.amax(), "{n}: {}", (found - expected).amax());
+        }
+    }
+
+    #[test]
+    fn symmetric_panels_give_what_one_piece_gives() {
+        for n in [1, PANEL, PANEL + 1, 3 * PANEL + 7] {
+            let random = |i: usize, j: usize| ((i * 7919 + j * 104_729 + 13) % 1009) as f64 / 1009.0 - 0.5;
+            let matrix = DMatrix::from_fn(n, n, |i, j| random(i + j, i * j) + f64::from(u8::from(i == j)) * n as f64);
+            let given = DMatrix::from_fn(n, 3, |i, j| random(j, i + 5));
+            let mut found = given.clone();
+            assert!(eliminate_symmetric(matrix.clone(), &mut found));
+            let expected = matrix.clone().lu().solve(&given).unwrap();
+            assert!((&found - &expected).amax() < 1e-12 * expected.amax(), "{n}: {}", (found - expected).amax());
+            assert!(!eliminate_symmetric(-matrix, &mut given.clone()));
+        }
+    }
+
+    #[test]
+    fn nothing_finite_comes_of_a_singular_matrix() {
+        let mut x = DMatrix::repeat(2 * PANEL, 1, 1.0);
+        eliminate(DMatrix::zeros(2 * PANEL, 2 * PANEL), &mut x);
+        assert!(x.iter().all(|x| x.is_nan()));
+    }
 }

@@ -5,7 +5,7 @@
 
 use crate::SolveError;
 use crate::direct::eliminate;
-use faer::Mat;
+use nalgebra::DMatrix;
 
 /// 𝓕 of N surfaces, row by row, from their form factors (row by row) and emittances.
 ///
@@ -27,10 +27,11 @@ pub fn script_f(factors: &[f64], emittances: &[f64]) -> Result<Vec<f64>, SolveEr
     if !emittances.iter().all(|e| (0.0..=1.0).contains(e)) {
         return Err(SolveError::NotApplicable("script-F needs emittances from 0 to 1"));
     }
-    let matrix = Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j)) - (1.0 - emittances[i]) * factors[i * n + j]);
-    let mut x = Mat::from_fn(n, n, |i, j| if i == j { emittances[i] } else { 0.0 });
-    eliminate(&matrix, &mut x);
-    let product = Mat::from_fn(n, n, |i, j| factors[i * n + j]) * x;
+    let matrix =
+        DMatrix::from_fn(n, n, |i, j| f64::from(u8::from(i == j)) - (1.0 - emittances[i]) * factors[i * n + j]);
+    let mut x = DMatrix::from_fn(n, n, |i, j| if i == j { emittances[i] } else { 0.0 });
+    eliminate(matrix, &mut x);
+    let product = DMatrix::from_fn(n, n, |i, j| factors[i * n + j]) * x;
     let script: Vec<f64> = (0..n * n).map(|k| emittances[k / n] * product[(k / n, k % n)]).collect();
     if script.iter().all(|f| f.is_finite()) {
         Ok(script)

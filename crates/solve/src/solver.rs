@@ -164,10 +164,6 @@ table! {
     }
 }
 
-/// Matrices that faer holds at a time: the one that is given; for LU the two factors, for Cholesky one.
-const LU_MATRICES: usize = 3;
-const CHOLESKY_MATRICES: usize = 2;
-
 impl Solver {
     /// Whether it needs A_i F_ij = A_j F_ji, to about rounding: of factors that are stored once for both directions.
     pub fn needs_reciprocity(self) -> bool {
@@ -185,14 +181,10 @@ impl Solver {
         matches!(self, Solver::Lu | Solver::Cholesky)
     }
 
-    /// Bytes of the full matrices that it fills for so many unknowns; none where it takes F as it is stored.
+    /// Bytes of the full matrix that it fills for so many unknowns, and eliminates in place; none where it takes F as it is
+    /// stored.
     pub fn matrix_bytes(self, unknowns: usize) -> usize {
-        let matrices = match self {
-            Solver::Lu => LU_MATRICES,
-            Solver::Cholesky => CHOLESKY_MATRICES,
-            _ => 0,
-        };
-        unknowns.saturating_mul(unknowns).saturating_mul(matrices * size_of::<f64>())
+        if self.is_direct() { unknowns.saturating_mul(unknowns).saturating_mul(size_of::<f64>()) } else { 0 }
     }
 
     /// All names, separated by commas.

@@ -7,7 +7,7 @@ use serde_json::Value;
 #[test]
 fn a_comparison_is_written_as_a_page_and_as_numbers() {
     let room = Room::new("compare");
-    const FEW: &str = "compare --elements 40 --methods rays,hemicube,exact,cubature --solvers cg,progressive,gauss-seidel --budget 4s";
+    const FEW: &str = "compare --elements 40 --methods rays,hemicube,exact,cubature --solvers cg,progressive,gauss-seidel --budget 2s";
     let result = room.run(format!("--json -q {FEW} -o a.html -o a.json").split(' ')).result();
     assert_eq!(room.names(), ["a.html", "a.json"]);
     assert_eq!(result["output"], serde_json::json!(["a.html", "a.json"]));

@@ -61,7 +61,7 @@ fn catalogue_42_the_display_is_as_near_as_asked() {
     for scene in [cornell_box(), room(0.5, false), room(0.9, false), room(0.8, true)] {
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let size = if mesh.triangles.len() > 30 { 0.5 } else { 1.5 };
+        let size = if mesh.triangles.len() > 30 { 0.5 } else { 3.0 };
         let plain = SolveOptions { element_size: Some(size), rays: 32, ..SolveOptions::default() };
         let tight = Params { tolerance: 2e-6, ..plain.params };
         let exact = Solution::new(&tracer, &SolveOptions { params: tight, ..plain }, &()).unwrap();

@@ -17,7 +17,6 @@ fn catalogue_31_elimination_leaves_rounding() {
 
 /// Catalogue 31 for N = 2,000: 18 × 18 patches a face make 1,944.
 #[test]
-#[ignore = "takes seconds"]
 fn catalogue_31_elimination_of_two_thousand_unknowns() {
     let system = room(18);
     for solver in [Solver::Lu, Solver::Cholesky] {
