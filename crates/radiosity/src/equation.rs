@@ -134,9 +134,10 @@ pub const TABLE_TOLERANCE: f64 = 1e-6;
 /// Work between two looks at what is displayed, applications of F: a look costs about as much as a tenth of one.
 const LOOK: f64 = 0.5;
 
-/// Sweeps that are made whether or not there is time, where one is a step: some milliseconds each, and without them there is
-/// no reflected light.
+/// Sweeps, and seconds, that there are whether or not there is time, where one is a step: some milliseconds each, and without them
+/// there is no reflected light.
 const FIRST_SWEEPS: f64 = 4.0;
+const FIRST_SECONDS: f64 = 0.1;
 
 /// How to solve, and when an iterate will do.
 pub(crate) struct Task<'a> {
@@ -158,6 +159,7 @@ pub(crate) fn solve(
     let solver = task.solver;
     let mut way = Way::new(solver.is_random(), task.params.tolerance, &response.diffuse.reflectance);
     let (mut looked, mut reached) = (f64::NEG_INFINITY, f64::INFINITY);
+    let begun = Instant::now();
     let step = |x: &[f64], info: &Info| {
         if !monitor.step(way.done(info), PARTS) {
             return Go::Stop;
@@ -172,7 +174,8 @@ pub(crate) fn solve(
                 x.len() / 3
             ));
         }
-        if is_over(monitor) && (info.work >= FIRST_SWEEPS || !solver.applies_only()) {
+        let is_begun = info.work >= FIRST_SWEEPS && begun.elapsed().as_secs_f64() >= FIRST_SECONDS;
+        if is_over(monitor) && (is_begun || !solver.applies_only()) {
             return Go::Enough;
         }
         if let Some((screen, asked)) = task.displayed {

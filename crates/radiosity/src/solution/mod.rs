@@ -15,14 +15,20 @@ use crate::displayed::{Screen, Shown};
 use crate::division::{Optics, Sheets, divided};
 use crate::equation::{self, Matrix, Task, single};
 use crate::footprint::{self, least_memory};
-use crate::monitor::{Begin, Hurry, Monitor, Stages, Watch, is_over};
+use crate::monitor::{Begin, Hurry, Monitor, Stages, Timed, Watch, is_over};
+use crate::pace;
 use radiosity_scene::{Bands, Elements, SkyPatches, size};
 use radiosity_solve::{DiffuseResponse, Info};
 use radiosity_trace::Tracer;
 use radiosity_transport::{Columns, ElementReceivers, Exposure, ExtendError, Gather, HitTable, IdSpace, Luminaires};
+use std::time::Duration;
 
 /// Rays per cell that are traced whether or not there is time, where elements are [`FEW`]: a tenth of a second for a room.
 const FIRST_RAYS: usize = 16;
+
+/// Part of the time left for rays that is kept for solving with them, which takes an eighth to a fifth as long. Without it a sun-lit room
+/// within a wide landscape still had most of the ambient term, which is the landscape's: half as much light again as there was.
+const SOLVED: f64 = 0.2;
 
 /// So many elements get their direct light and their first rays whether or not there is time: a few seconds. A building of a
 /// million triangles took 102 s where 60 were allowed.
@@ -297,7 +303,7 @@ impl<'a> Solution<'a> {
     }
 
     /// Appends rays up to `rays` per cell. Where there is a time limit they come in portions, each as many as there are, and
-    /// those that it does not leave time for are not there; where elements are few, sixteen always are.
+    /// those that it does not leave time for, nor for solving with them, are not there; where elements are few, sixteen always are.
     fn trace(&mut self, rays: usize, monitor: &dyn Monitor) -> Result<(), Error> {
         let ids = IdSpace { elements: &self.elements, sky: self.sky };
         let mesh = self.tracer.mesh;
@@ -307,9 +313,10 @@ impl<'a> Solution<'a> {
         let (tracer, table) = (self.tracer, &mut self.table);
         let in_files = table.bytes_in_files();
         self.stages.time(monitor, "rays", || -> Result<(), Error> {
-            if monitor.deadline().is_none() {
+            let Some(left) = pace::left(monitor) else {
                 return Ok(table.extend(tracer, (&ids, &sky), &receivers, rays, &Watch(monitor))?);
-            }
+            };
+            let monitor = &Timed::new(monitor, Duration::from_secs_f64((1.0 - SOLVED) * left));
             if table.columns() == 0 {
                 let begin = Begin { monitor, is_soon: receivers.elements.len() <= FEW };
                 match table.extend(tracer, (&ids, &sky), &receivers, FIRST_RAYS.min(rays), &begin) {

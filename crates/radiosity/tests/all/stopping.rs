@@ -179,6 +179,20 @@ fn catalogue_42_a_limit_of_time_leaves_a_whole_answer() {
     assert!(matches!(error, Error::Time(_)), "{error}");
 }
 
+/// Rays leave time for what solves with them, however many are asked for: of a sun-lit room within a landscape all had the light
+/// of the landscape's ambient term after four sweeps.
+#[test]
+fn a_limit_of_time_leaves_some_for_the_solver() {
+    let scene = room(0.9, false);
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let solve = SolveOptions { element_size: Some(0.5), rays: 1 << 17, ..SolveOptions::default() };
+    let solution = Solution::new(&tracer, &solve, &Timed::new(&(), Duration::from_millis(300))).unwrap();
+    assert!((16..1 << 17).contains(&solution.rays()), "{}", solution.rays());
+    let residual = &solution.info.residual;
+    assert!(residual.iter().all(|r| *r <= solve.params.tolerance), "{residual:?} after {} steps", solution.info.steps);
+}
+
 /// Of more elements than are begun whether or not there is time, none need be reached: the answer is whole all the same, and
 /// says how far it is off. A building of a million triangles took 102 s where 60 were allowed.
 #[test]
