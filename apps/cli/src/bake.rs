@@ -115,8 +115,9 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         || arguments.picture.frames.is_some()
         || arguments.picture.camera.is_some()
         || arguments.picture.eye.is_some();
-    let camera =
-        needs_camera.then(|| views::camera(&input.scene, &tracer, &arguments.picture, progress)).transpose()?;
+    let camera = needs_camera
+        .then(|| views::camera(&input.scene, &tracer, &arguments.picture, &arguments.scene, progress))
+        .transpose()?;
 
     progress.parts();
     arguments.solve.warn_of_methods(progress);

@@ -500,12 +500,13 @@ fn summary(
     }
     let mut lines = vec![head];
     lines.extend(input.vs3.iter().flat_map(|vs3| rows_of_vs3(vs3, enclosure, table.is_script_f)));
+    let (accuracy, usual) = (options.form.adaptive.accuracy, FactorsOptions::default().form.adaptive.accuracy);
     let choices = found.factors.choices;
+    if choices.is_some() && accuracy > usual {
+        lines.push(format!("asked for {accuracy:e} (--accuracy; {usual:e} where that takes less than minutes)"));
+    }
     if let Some(rays) = choices.map(|c| c.rays).filter(|rays| *rays > 0) {
-        let accuracy = options.form.adaptive.accuracy;
-        lines.push(format!(
-            "{rays} rays from all over surfaces, as pairs of facets take longer; asked for {accuracy:e} (--accuracy)"
-        ));
+        lines.push(format!("{rays} rays from all over surfaces, as pairs of facets take longer"));
     } else if let Some(c) = choices {
         let cubature: usize = c.clear_cubature.iter().sum();
         lines.push(format!(

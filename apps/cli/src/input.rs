@@ -40,11 +40,19 @@ impl SceneArguments {
         self.scene.as_deref().into_iter().chain(sky).collect()
     }
 
+    fn is_obj(&self) -> bool {
+        self.scene.as_ref().and_then(|path| path.extension()).is_some_and(|e| e.eq_ignore_ascii_case("obj"))
+    }
+
+    /// Whether neither the format nor the call says which way is up.
+    pub fn is_up_unknown(&self) -> bool {
+        self.is_obj() && self.up.is_none()
+    }
+
     /// A call that means something else than it does is not carried out.
     fn refuse_what_has_no_effect(&self) -> Result<(), Failure> {
-        let is_obj = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
         let named = [("--unit", self.unit.is_some()), ("--obj-double-sided", self.obj_double_sided)];
-        if let Some((option, _)) = named.iter().find(|(_, given)| *given && !self.scene.as_ref().is_some_and(is_obj)) {
+        if let Some((option, _)) = named.iter().find(|(_, given)| *given && !self.is_obj()) {
             let why = match *option {
                 "--unit" => "lengths of a glTF and of the built-in scene are metres",
                 _ => "a glTF says by its materials what is two-sided",

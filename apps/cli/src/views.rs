@@ -2,7 +2,7 @@
 //! meter on the surface would show.
 
 use crate::illuminance::Illuminance;
-use crate::input::PictureArguments;
+use crate::input::{PictureArguments, SceneArguments};
 use crate::progress::Progress;
 use crate::{Failure, numbers};
 use glam::DVec3;
@@ -104,6 +104,7 @@ pub fn camera(
     scene: &Scene,
     tracer: &Tracer,
     asked: &PictureArguments,
+    source: &SceneArguments,
     progress: &Progress,
 ) -> Result<Camera, Failure> {
     let (mut camera, is_placed) = match (asked.eye.zip(asked.target), &asked.camera, scene.cameras.first()) {
@@ -131,6 +132,9 @@ pub fn camera(
     }
     if is_placed {
         progress.say(&format!("note: the camera placed for this scene is {}", in_words(&camera, scene, asked.size)));
+        if source.is_up_unknown() {
+            progress.say("note: y is taken to point up, as an OBJ does not say; where it is z: --up z");
+        }
     }
     Ok(camera)
 }

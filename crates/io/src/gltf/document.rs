@@ -144,7 +144,8 @@ impl Document {
                     let mut own = Faults::default();
                     let loaded = files.read(uri, &place, &mut own);
                     for fault in own.0 {
-                        faults.warning(fault.place, fault.what, fault.hint);
+                        let what = format!("{}; what it is laid on has its plain colour", fault.what);
+                        faults.warning(fault.place, what, fault.hint);
                     }
                     loaded
                 }

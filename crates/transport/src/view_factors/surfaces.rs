@@ -52,6 +52,9 @@ const RAYS: f64 = 4e5;
 const PAIR_GROWS: f64 = 0.8;
 const RAYS_GROW: f64 = 1.5;
 
+/// What may be waited for unasked, s.
+const PATIENCE: f64 = 60.0;
+
 /// The view factors between all surfaces of an enclosure, by rays where that takes less.
 ///
 /// # Errors
@@ -69,24 +72,35 @@ pub fn surface_factors(
 }
 
 impl ViewFactorOptions {
-    /// These options for who asks for no accuracy: 10⁻³ where rays would be sent for that of these options, which would take hours.
+    /// These options for who asks for no accuracy: 10⁻³ where surfaces have several facets each and this accuracy would take minutes, by
+    /// whatever takes less. Of a chair of 528 facets 10⁻⁵ took three, and 10⁻³ takes a tenth of a second.
     pub fn usual(self, enclosure: &Enclosure) -> ViewFactorOptions {
-        if takes_less_by_rays(enclosure, &self) { ViewFactorOptions { accuracy: ACCURACY, ..self } } else { self }
+        let coarser = ViewFactorOptions { accuracy: self.accuracy.max(ACCURACY), ..self };
+        match seconds(enclosure, &self) {
+            Some([rays, pairs]) if rays.min(pairs) > PATIENCE => coarser,
+            _ => self,
+        }
     }
 }
 
 fn takes_less_by_rays(enclosure: &Enclosure, options: &ViewFactorOptions) -> bool {
+    seconds(enclosure, options).is_some_and(|[rays, pairs]| rays <= pairs)
+}
+
+/// What rays and pairs of facets are going to take, about; none where nothing is to be summed up. Rays that are too many, or for which there is
+/// no memory, take for ever.
+fn seconds(enclosure: &Enclosure, options: &ViewFactorOptions) -> Option<[f64; 2]> {
     let (surfaces, facets) = (enclosure.surfaces.len(), enclosure.facets.len());
-    let Some([low, high]) = enclosure.bounds().filter(|_| surfaces < facets) else { return false };
+    let [low, high] = enclosure.bounds().filter(|_| surfaces < facets)?;
     let extent = high.distance(low);
     let finer = ACCURACY / options.accuracy;
     let rays = RAYS * finer.powf(RAYS_GROW);
     let is_possible = rays <= MOST as f64
         && surfaces.saturating_mul(surfaces).saturating_mul(ROOM) <= options.memory
         && enclosure.surface_areas().iter().all(|area| *area > 0.0);
-    let panels = || panels(enclosure, &mut Planes::new(extent, TOUCH * extent)).len();
-    let by_pairs = || PAIR * 0.5 * (facets as f64).powi(2) * panels() as f64 * finer.powf(PAIR_GROWS);
-    is_possible && RAY * rays * surfaces as f64 <= by_pairs()
+    let by_rays = if is_possible { RAY * rays * surfaces as f64 } else { f64::INFINITY };
+    let panels = panels(enclosure, &mut Planes::new(extent, TOUCH * extent)).len();
+    Some([by_rays, PAIR * 0.5 * (facets as f64).powi(2) * panels as f64 * finer.powf(PAIR_GROWS)])
 }
 
 /// A surface that rays start from: places on what is exposed of its facets, which come along a curve, so that numbers that are near are places that are.
@@ -347,6 +361,8 @@ mod tests {
     fn what_takes_less_is_chosen() {
         let walls = grouped(box_of(DVec3::ONE, 8), 64);
         assert!(!takes_less_by_rays(&walls, &asked(1e-3)));
+        let usual = |asked_for: f64, room: &Enclosure| asked(asked_for).usual(room).accuracy;
+        assert_eq!(usual(1e-5, &walls), 1e-5);
         let mut heap = Enclosure::default();
         for k in 0..1000 {
             let [x, y, z, a, b, c] = [1, 2, 3, 5, 7, 11].map(|m| f64::from(k * m % 97) / 97.0);
@@ -357,6 +373,11 @@ mod tests {
         let heap = grouped(heap, 100);
         assert!(takes_less_by_rays(&heap, &asked(1e-3)) && !takes_less_by_rays(&heap, &asked(1e-9)));
         assert!(!takes_less_by_rays(&heap, &ViewFactorOptions { memory: 1000, ..asked(1e-3) }));
+        // Unasked nobody waits for long, and nobody who asks for little gets more.
+        assert_eq!([1e-5, 1e-2].map(|accuracy| usual(accuracy, &heap)), [1e-3, 1e-2]);
+        // One body: pairs at 1e-5 take less than rays at that, but minutes.
+        let body = grouped(heap, 1000);
+        assert!(!takes_less_by_rays(&body, &asked(1e-5)) && usual(1e-5, &body) == 1e-3);
     }
 
     #[test]
