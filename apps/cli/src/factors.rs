@@ -36,8 +36,8 @@ pub struct Arguments {
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     element_size: Option<f64>,
     /// Largest error of a factor between surfaces that see each other partly, 1e-5 by default; for the adaptive method. What is
-    /// not hidden at all is found to 1e-9 or better. Surfaces of very many facets send rays, by default until factors are good to
-    /// 1e-3: seconds for furniture, where 1e-5 takes hours.
+    /// not hidden at all is found to 1e-9 or better. Meshes that would take minutes so are asked for 1e-3 by default, for which they
+    /// send rays: seconds for furniture, where 1e-5 takes hours.
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = numbers::positive)]
     accuracy: Option<f64>,
     /// Cells along a side of the surface that hemicube and its like project on, an even number from 4 to 2048, 256 by
@@ -255,9 +255,9 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
 }
 
 /// Bytes of an entry of the full matrices that are made of factors to write them: a value and its error; twice that where
-/// masks are put in; for script-F the factors, what is eliminated, its two triangles and the result.
+/// masks are put in; for script-F the factors, what is eliminated, which then is their copy, the solution and the result.
 const ENTRY_BYTES: usize = size_of::<f64>() + size_of::<f32>();
-const SCRIPT_BYTES: usize = 5 * size_of::<f64>();
+const SCRIPT_BYTES: usize = 4 * size_of::<f64>();
 
 /// Refuses full matrices that are beyond the memory.
 fn refuse_beyond(surfaces: usize, entry: usize, what: &str, allowed: usize) -> Result<(), Failure> {
@@ -500,10 +500,9 @@ fn summary(
     }
     let mut lines = vec![head];
     lines.extend(input.vs3.iter().flat_map(|vs3| rows_of_vs3(vs3, enclosure, table.is_script_f)));
-    let (accuracy, usual) = (options.form.adaptive.accuracy, FactorsOptions::default().form.adaptive.accuracy);
     let choices = found.factors.choices;
-    if choices.is_some() && accuracy > usual {
-        lines.push(format!("asked for {accuracy:e} (--accuracy; {usual:e} where that takes less than minutes)"));
+    if choices.is_some() {
+        lines.push(format!("factors asked for to {:e} (--accuracy)", options.form.adaptive.accuracy));
     }
     if let Some(rays) = choices.map(|c| c.rays).filter(|rays| *rays > 0) {
         lines.push(format!("{rays} rays from all over surfaces, as pairs of facets take longer"));

@@ -267,6 +267,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         }
         if ends {
             stages.absorb(&solution.stages);
+            let is_cut = solution.is_cut();
             return Ok(Baked {
                 solution,
                 received,
@@ -276,7 +277,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 audit,
                 achieved,
                 // A first round that was cut short may have ended it in other ways.
-                out_of_time: !achieved && (out_of_time || is_over(monitor)),
+                out_of_time: !achieved && (out_of_time || is_cut || is_over(monitor)),
                 rounds,
                 stages,
                 error: options.error,

@@ -135,7 +135,7 @@ pub const TABLE_TOLERANCE: f64 = 1e-6;
 const LOOK: f64 = 0.5;
 
 /// Sweeps, and seconds, that there are whether or not there is time, where one is a step: some milliseconds each, and without them
-/// there is no reflected light.
+/// there is no reflected light. In so many seconds a room is solved.
 const FIRST_SWEEPS: f64 = 4.0;
 const FIRST_SECONDS: f64 = 0.1;
 

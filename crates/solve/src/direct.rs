@@ -11,7 +11,7 @@ use crate::gauge::{Gauge, is_done};
 use crate::{Go, Info, Params, Response, Rows, SolveError, Space};
 use nalgebra::DMatrix;
 
-/// Columns whose pivots are found one by one; whatever is beside them follows in one product of matrices.
+/// Columns whose pivots are found one by one; whatever is beside them follows in one product of matrices, which takes so many at once well.
 const PANEL: usize = 64;
 
 /// LU factors with partial pivoting; `b` receives the result.
@@ -99,7 +99,7 @@ pub fn cholesky<T: Rows>(
 }
 
 /// Solves for the columns of `x` in place: panel by panel of the matrix, by partial pivoting (Golub and Van Loan 2013,
-/// sect. 3.4.7). Of a matrix that is singular nothing finite comes.
+/// sect. 3.4). Where a pivot is nothing, nothing finite comes.
 pub(crate) fn eliminate(mut matrix: DMatrix<f64>, x: &mut DMatrix<f64>) {
     let n = matrix.nrows();
     for start in (0..n).step_by(PANEL) {
@@ -114,8 +114,14 @@ pub(crate) fn eliminate(mut matrix: DMatrix<f64>, x: &mut DMatrix<f64>) {
             below.gemm(-1.0, &factors.rows_range(end - start..), &above, 1.0);
         }
     }
-    if !matrix.solve_upper_triangular_mut(x) {
-        x.fill(f64::NAN);
+    for start in (0..n).step_by(PANEL).rev() {
+        let end = n.min(start + PANEL);
+        let (mut above, mut own) = x.rows_range_pair_mut(..start, start..end);
+        if !matrix.view_range(start..end, start..end).solve_upper_triangular_mut(&mut own) {
+            x.fill(f64::NAN);
+            return;
+        }
+        above.gemm(-1.0, &matrix.view_range(..start, start..end), &own, 1.0);
     }
 }
 
@@ -194,12 +200,14 @@ mod tests {
             assert!(eliminate_symmetric(matrix.clone(), &mut found));
             let expected = matrix.clone().lu().solve(&given).unwrap();
             assert!((&found - &expected).amax() < 1e-12 * expected.amax(), "{n}: {}", (found - expected).amax());
-            assert!(!eliminate_symmetric(-matrix, &mut given.clone()));
+            let mut indefinite = matrix;
+            indefinite[(n - 1, n - 1)] *= -1.0;
+            assert!(!eliminate_symmetric(indefinite, &mut given.clone()));
         }
     }
 
     #[test]
-    fn nothing_finite_comes_of_a_singular_matrix() {
+    fn nothing_finite_comes_of_no_pivots() {
         let mut x = DMatrix::repeat(2 * PANEL, 1, 1.0);
         eliminate(DMatrix::zeros(2 * PANEL, 2 * PANEL), &mut x);
         assert!(x.iter().all(|x| x.is_nan()));

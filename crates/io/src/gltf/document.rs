@@ -144,7 +144,7 @@ impl Document {
                     let mut own = Faults::default();
                     let loaded = files.read(uri, &place, &mut own);
                     for fault in own.0 {
-                        let what = format!("{}; what it is laid on has its plain colour", fault.what);
+                        let what = format!("{}; materials are as without it", fault.what);
                         faults.warning(fault.place, what, fault.hint);
                     }
                     loaded

@@ -61,6 +61,8 @@ pub struct Solution<'a> {
     pub element_size: f64,
     sky: SkyPatches,
     table: HitTable,
+    /// Whether time left fewer rays than were asked for.
+    is_cut: bool,
     /// What other methods than rays found of F between elements.
     matrix: Option<Matrix>,
     options: SolveOptions,
@@ -173,6 +175,7 @@ impl<'a> Solution<'a> {
             element_size,
             sky,
             table,
+            is_cut: false,
             matrix: None,
             options: *options,
             values,
@@ -258,14 +261,19 @@ impl<'a> Solution<'a> {
         self.table.columns()
     }
 
+    /// Whether time left fewer rays than were asked for.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
     /// Rays of all elements together.
     pub(crate) fn rays_in_all(&self) -> f64 {
         let share = |element| self.elements.share(self.tracer.mesh, element);
         self.rays() as f64 * (0..self.elements.len() as u32).map(share).sum::<f64>()
     }
 
-    /// Appends rays up to `rays` per cell and solves again from the solution so far. When the monitor's time is over, it ends
-    /// with what it has: fewer rays, perhaps ([`Solution::rays`]), and the iterate by then ([`Solution::info`]).
+    /// Appends rays up to `rays` per cell and solves again from the solution so far. Of a monitor's time a fifth is kept for solving; when
+    /// it is over, it ends with what it has: fewer rays, perhaps ([`Solution::rays`]), and the iterate by then ([`Solution::info`]).
     ///
     /// # Errors
     /// As [`Solution::new`]; [`Error::Displayed`], [`Error::Tolerance`], [`Error::Time`], [`Error::File`].
@@ -316,7 +324,6 @@ impl<'a> Solution<'a> {
             let Some(left) = pace::left(monitor) else {
                 return Ok(table.extend(tracer, (&ids, &sky), &receivers, rays, &Watch(monitor))?);
             };
-            let monitor = &Timed::new(monitor, Duration::from_secs_f64((1.0 - SOLVED) * left));
             if table.columns() == 0 {
                 let begin = Begin { monitor, is_soon: receivers.elements.len() <= FEW };
                 match table.extend(tracer, (&ids, &sky), &receivers, FIRST_RAYS.min(rays), &begin) {
@@ -324,6 +331,7 @@ impl<'a> Solution<'a> {
                     done => done?,
                 }
             }
+            let monitor = &Timed::new(monitor, Duration::from_secs_f64((1.0 - SOLVED) * left));
             while table.columns() < rays && !is_over(monitor) {
                 let next = (2 * table.columns()).min(rays);
                 match table.extend(tracer, (&ids, &sky), &receivers, next, &Hurry(monitor)) {
@@ -333,6 +341,7 @@ impl<'a> Solution<'a> {
             }
             Ok(())
         })?;
+        self.is_cut = self.table.columns() < rays;
         if self.table.bytes_in_files() > in_files {
             let (bytes, folder) = (size(self.table.bytes_in_files()), std::env::temp_dir());
             monitor.note(&format!(

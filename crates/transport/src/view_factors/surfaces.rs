@@ -52,8 +52,9 @@ const RAYS: f64 = 4e5;
 const PAIR_GROWS: f64 = 0.8;
 const RAYS_GROW: f64 = 1.5;
 
-/// What may be waited for unasked, s.
+/// What may be waited for unasked, s; of surfaces of so many facets each, of which no more unite to one panel.
 const PATIENCE: f64 = 60.0;
+const MESH: usize = 4;
 
 /// The view factors between all surfaces of an enclosure, by rays where that takes less.
 ///
@@ -72,35 +73,48 @@ pub fn surface_factors(
 }
 
 impl ViewFactorOptions {
-    /// These options for who asks for no accuracy: 10⁻³ where surfaces have several facets each and this accuracy would take minutes, by
-    /// whatever takes less. Of a chair of 528 facets 10⁻⁵ took three, and 10⁻³ takes a tenth of a second.
+    /// These options for who asks for no accuracy: 10⁻³ where rays would be sent for that of these options, which would take hours, and for
+    /// meshes of which it would take minutes pair by pair. Of a chair of 528 facets 10⁻⁵ took three, and 10⁻³ takes a tenth of a second.
     pub fn usual(self, enclosure: &Enclosure) -> ViewFactorOptions {
-        let coarser = ViewFactorOptions { accuracy: self.accuracy.max(ACCURACY), ..self };
-        match seconds(enclosure, &self) {
-            Some([rays, pairs]) if rays.min(pairs) > PATIENCE => coarser,
-            _ => self,
-        }
+        let Some(Work { rays, pairs, panels }) = Work::of(enclosure, &self) else { return self };
+        let (surfaces, facets) = (enclosure.surfaces.len(), enclosure.facets.len());
+        // Patches of walls take far less than is thought of meshes, whose facets look all ways.
+        let is_mesh = MESH * surfaces <= facets && facets <= MESH * panels;
+        let takes_long = rays <= pairs || is_mesh && pairs > PATIENCE;
+        if takes_long { ViewFactorOptions { accuracy: self.accuracy.max(ACCURACY), ..self } } else { self }
     }
 }
 
 fn takes_less_by_rays(enclosure: &Enclosure, options: &ViewFactorOptions) -> bool {
-    seconds(enclosure, options).is_some_and(|[rays, pairs]| rays <= pairs)
+    Work::of(enclosure, options).is_some_and(|work| work.rays <= work.pairs)
 }
 
-/// What rays and pairs of facets are going to take, about; none where nothing is to be summed up. Rays that are too many, or for which there is
-/// no memory, take for ever.
-fn seconds(enclosure: &Enclosure, options: &ViewFactorOptions) -> Option<[f64; 2]> {
-    let (surfaces, facets) = (enclosure.surfaces.len(), enclosure.facets.len());
-    let [low, high] = enclosure.bounds().filter(|_| surfaces < facets)?;
-    let extent = high.distance(low);
-    let finer = ACCURACY / options.accuracy;
-    let rays = RAYS * finer.powf(RAYS_GROW);
-    let is_possible = rays <= MOST as f64
-        && surfaces.saturating_mul(surfaces).saturating_mul(ROOM) <= options.memory
-        && enclosure.surface_areas().iter().all(|area| *area > 0.0);
-    let by_rays = if is_possible { RAY * rays * surfaces as f64 } else { f64::INFINITY };
-    let panels = panels(enclosure, &mut Planes::new(extent, TOUCH * extent)).len();
-    Some([by_rays, PAIR * 0.5 * (facets as f64).powi(2) * panels as f64 * finer.powf(PAIR_GROWS)])
+/// What rays and pairs of facets are going to take, s, about. Rays that are too many, or for which there is no memory, take for ever.
+struct Work {
+    rays: f64,
+    pairs: f64,
+    /// What facets in planes unite to, that may stand between others.
+    panels: usize,
+}
+
+impl Work {
+    /// None where nothing is to be summed up.
+    fn of(enclosure: &Enclosure, options: &ViewFactorOptions) -> Option<Work> {
+        let (surfaces, facets) = (enclosure.surfaces.len(), enclosure.facets.len());
+        let [low, high] = enclosure.bounds().filter(|_| surfaces < facets)?;
+        let extent = high.distance(low);
+        let finer = ACCURACY / options.accuracy;
+        let rays = RAYS * finer.powf(RAYS_GROW);
+        let is_possible = rays <= MOST as f64
+            && surfaces.saturating_mul(surfaces).saturating_mul(ROOM) <= options.memory
+            && enclosure.surface_areas().iter().all(|area| *area > 0.0);
+        let panels = panels(enclosure, &mut Planes::new(extent, TOUCH * extent)).len();
+        Some(Work {
+            rays: if is_possible { RAY * rays * surfaces as f64 } else { f64::INFINITY },
+            pairs: PAIR * 0.5 * (facets as f64).powi(2) * panels as f64 * finer.powf(PAIR_GROWS),
+            panels,
+        })
+    }
 }
 
 /// A surface that rays start from: places on what is exposed of its facets, which come along a curve, so that numbers that are near are places that are.
@@ -363,20 +377,32 @@ mod tests {
         assert!(!takes_less_by_rays(&walls, &asked(1e-3)));
         let usual = |asked_for: f64, room: &Enclosure| asked(asked_for).usual(room).accuracy;
         assert_eq!(usual(1e-5, &walls), 1e-5);
-        let mut heap = Enclosure::default();
-        for k in 0..1000 {
-            let [x, y, z, a, b, c] = [1, 2, 3, 5, 7, 11].map(|m| f64::from(k * m % 97) / 97.0);
-            let corner = 4.0 * DVec3::new(x, y, z);
-            let corners = vec![corner, corner + DVec3::new(a, b, 0.1), corner + DVec3::new(0.1, b - 1.0, c)];
-            heap.add(k.to_string(), Facet::new(corners).unwrap());
-        }
-        let heap = grouped(heap, 100);
+        let patches = grouped(room_with_block(12), 144);
+        let work = Work::of(&patches, &asked(1e-7)).unwrap();
+        assert!(
+            work.pairs > PATIENCE && MESH * work.panels < patches.facets.len(),
+            "{} s, {} panels",
+            work.pairs,
+            work.panels
+        );
+        assert_eq!(usual(1e-7, &patches), 1e-7);
+        let heap = |facets: usize, of_each: usize| {
+            let mut heap = Enclosure::default();
+            for k in 0..facets {
+                let [x, y, z, a, b, c] = [1, 2, 3, 5, 7, 11].map(|m| (k * m * 617 % 9973) as f64 / 9973.0);
+                let corner = 4.0 * DVec3::new(x, y, z);
+                let corners = vec![corner, corner + DVec3::new(a, b, 0.1), corner + DVec3::new(0.1, b - 1.0, c)];
+                heap.add(k.to_string(), Facet::new(corners).unwrap());
+            }
+            grouped(heap, of_each)
+        };
+        let body = heap(500, 500);
+        let heap = heap(1000, 100);
         assert!(takes_less_by_rays(&heap, &asked(1e-3)) && !takes_less_by_rays(&heap, &asked(1e-9)));
         assert!(!takes_less_by_rays(&heap, &ViewFactorOptions { memory: 1000, ..asked(1e-3) }));
         // Unasked nobody waits for long, and nobody who asks for little gets more.
         assert_eq!([1e-5, 1e-2].map(|accuracy| usual(accuracy, &heap)), [1e-3, 1e-2]);
         // One body: pairs at 1e-5 take less than rays at that, but minutes.
-        let body = grouped(heap, 1000);
         assert!(!takes_less_by_rays(&body, &asked(1e-5)) && usual(1e-5, &body) == 1e-3);
     }
 
