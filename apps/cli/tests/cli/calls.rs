@@ -80,7 +80,7 @@ fn wrong_calls_and_inputs_exit_with_2_and_say_what_to_do() {
         ),
         (
             "bake --solver lu --element-size 0.003",
-            "TB; 4.0 GB are allowed (use a larger --element-size, an iterative --solver",
+            "450 GB; 4.0 GB are allowed (use a larger --element-size, an iterative --solver",
         ),
         ("bake --solver cg", "those by rays do not (find them by --ff adaptive, or take another --solver"),
         ("render -o a.png --solver cholesky --ff hemicube", "--ff adaptive"),

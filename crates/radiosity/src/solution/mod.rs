@@ -321,9 +321,9 @@ impl<'a> Solution<'a> {
         let (tracer, table) = (self.tracer, &mut self.table);
         let in_files = table.bytes_in_files();
         self.stages.time(monitor, "rays", || -> Result<(), Error> {
-            let Some(left) = pace::left(monitor) else {
+            if monitor.deadline().is_none() {
                 return Ok(table.extend(tracer, (&ids, &sky), &receivers, rays, &Watch(monitor))?);
-            };
+            }
             if table.columns() == 0 {
                 let begin = Begin { monitor, is_soon: receivers.elements.len() <= FEW };
                 match table.extend(tracer, (&ids, &sky), &receivers, FIRST_RAYS.min(rays), &begin) {
@@ -331,6 +331,7 @@ impl<'a> Solution<'a> {
                     done => done?,
                 }
             }
+            let left = pace::left(monitor).unwrap_or(0.0);
             let monitor = &Timed::new(monitor, Duration::from_secs_f64((1.0 - SOLVED) * left));
             while table.columns() < rays && !is_over(monitor) {
                 let next = (2 * table.columns()).min(rays);
