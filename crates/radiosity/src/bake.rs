@@ -267,7 +267,7 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         }
         if ends {
             stages.absorb(&solution.stages);
-            let is_cut = solution.is_cut();
+            let is_cut = solution.is_cut;
             return Ok(Baked {
                 solution,
                 received,

@@ -315,7 +315,7 @@ pub fn measure(
         let out_of_time = !is_last && (lacks_time || !has_time(monitor, takes));
         if is_last || out_of_time {
             stages.absorb(&solution.stages);
-            let out_of_time = !answer.achieved && (out_of_time || solution.is_cut() || is_over(monitor));
+            let out_of_time = !answer.achieved && (out_of_time || solution.is_cut || is_over(monitor));
             return Ok(Measurement { out_of_time, rounds, stages, ..answer });
         }
         monitor.round(rounds.len() + 1, most_rounds);

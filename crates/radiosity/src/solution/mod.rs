@@ -62,7 +62,7 @@ pub struct Solution<'a> {
     sky: SkyPatches,
     table: HitTable,
     /// Whether time left fewer rays than were asked for.
-    is_cut: bool,
+    pub(crate) is_cut: bool,
     /// What other methods than rays found of F between elements.
     matrix: Option<Matrix>,
     options: SolveOptions,
@@ -259,11 +259,6 @@ impl<'a> Solution<'a> {
     /// M: rays per cell; the elements of a divided cell share them.
     pub fn rays(&self) -> usize {
         self.table.columns()
-    }
-
-    /// Whether time left fewer rays than were asked for.
-    pub(crate) fn is_cut(&self) -> bool {
-        self.is_cut
     }
 
     /// Rays of all elements together.
