@@ -1,8 +1,8 @@
 //! A continuous field from values that are constant on elements.
 //!
 //! Values sit on the corners of the cells of each triangle and are interpolated linearly. A corner's value is the
-//! area-weighted mean of the elements around it, over all triangles that are smooth there, moved where these lie to one side
-//! of it, and made equal across slivers; so constants stay constant, and light is continuous where the surface is. Where two triangles of different division share an edge, the coarser
+//! area-weighted mean of the elements around it, over all triangles that are smooth there, moved towards what keeps the means of
+//! cells, and made equal across slivers; so constants stay constant, and light is continuous where the surface is. Where two triangles of different division share an edge, the coarser
 //! one's corners count and the finer one's others on that edge are interpolated between them (anchored hanging nodes),
 //! so that no crack opens (catalogue 49, 61).
 

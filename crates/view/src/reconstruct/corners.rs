@@ -1,19 +1,17 @@
 //! The values of lattice corners from those of the cells around them.
 
 use super::planes::FLAT;
-use super::{Shared, corner, edge_corner, edge_key, edge_of, for_each_cell, lattice, shared_corner, sides};
-use glam::DVec3;
+use super::{corner, edge_corner, edge_key, edge_of, for_each_cell, lattice, shared_corner, sides};
 use radiosity_scene::{Bands, Elements, Mesh};
 use rustc_hash::FxHashMap;
 
-/// How far corners are moved towards what keeps the means of the cells where all cells lie to one side, as on the border of
-/// a smooth surface, and their mean is the value a third of a cell further in. 1.8 is exact where light is linear and the
-/// border straight, and takes the noise along. 1.5 leaves 0.80 % of error in the Cornell box where none leaves 0.86 % (128 rays).
+/// How often corners are moved towards what keeps the means of the cells, and by how much of what these miss on average around each
+/// (Landweber 1951). The mean of the cells around it is the value of a corner only where these lie around it evenly and light is not
+/// bent: on a border, it is that a third of a cell further in, and where needles of cells meet in fans, as modellers cut walls around
+/// windows, each corner had that of a place of its own, and the fans showed. Below the eaves of a house light is 0.5 % off where it was 3 %, and pictures of three
+/// models under the sky are 0.9, 1.6 and 1.1 % off where they were 1.7, 2.2 and 1.6. Twice as often, they are 0.8, 1.7 and 1.0 % off: noise is fitted then.
+const MOVES: usize = 4;
 const MOVED: f64 = 1.5;
-
-/// All cells lie to one side where the mean of the way to them is this part of its mean length: on a straight border it is
-/// half or more, beside a sliver as well, and nothing in the middle of a regular lattice.
-const ONE_SIDED: f64 = 0.5;
 
 /// A triangle is a sliver where its longest edge is so many times as long as it is high, which well-shaped ones with vertices on
 /// their edges are not. Between larger ones light is as good
@@ -27,12 +25,13 @@ const LARGER: f64 = 4.0;
 /// How often what lies across slivers is made equal: a sliver is some cells across.
 const EQUALIZED: usize = 4;
 
-/// A corner is not moved to less than this part of its mean, nor by more than to twice of it.
-const LEAST: f64 = 0.5;
+/// A corner is not moved to less than this part of its mean, nor to more than so many times it: in a contact there is little light.
+const LEAST: f64 = 0.1;
+const MOST: f64 = 2.0;
 
 /// A moved value, not too far from what it was before.
 fn within(moved: f64, before: f64) -> f64 {
-    moved.max(LEAST * before.abs()).min(before.abs() / LEAST)
+    moved.max(LEAST * before.abs()).min(MOST * before.abs())
 }
 
 /// The corners of all triangles, those that several share counted once.
@@ -45,12 +44,10 @@ pub(super) struct Corners<'a> {
     pub division: Vec<u32>,
     /// The number of each lattice corner.
     pub number: Vec<u32>,
-    /// The numbers of those on the borders of triangles.
-    shared: FxHashMap<Shared, u32>,
+    /// By lattice corner, between which numbers its value lies.
+    anchors: Vec<Anchor>,
     /// How many numbers there are.
     pub count: usize,
-    /// By edge, the coarsest division of the triangles that share it.
-    edges: FxHashMap<(u32, u32), u32>,
 }
 
 impl<'a> Corners<'a> {
@@ -77,7 +74,28 @@ impl<'a> Corners<'a> {
                 number.push(own);
             }
         }
-        Corners { mesh, elements, base, division, number, shared, count: count as usize, edges }
+        // By the corners of the coarsest of the triangles at an edge, which are those of all finer ones, too.
+        let mut anchors = Vec::with_capacity(number.len());
+        for (t, side) in sides(elements, division.len()) {
+            let k = division[t];
+            for (i, j) in lattice(k) {
+                let own = number[anchors.len()];
+                let Some((e, place)) = edge_of(i, j, k) else {
+                    anchors.push(Anchor { ends: [own; 2], share: 0.0 });
+                    continue;
+                };
+                let coarsest = edges[&edge_key(mesh, t, e)];
+                let step = k / coarsest;
+                let (low, rest) = (place / step, place % step);
+                let at = |place: u32| {
+                    let key = shared_corner(mesh, t, side, edge_corner(e, place, coarsest), coarsest);
+                    key.and_then(|key| shared.get(&key)).copied().unwrap_or(own)
+                };
+                let ends = if rest == 0 { [at(low); 2] } else { [at(low), at(low + 1)] };
+                anchors.push(Anchor { ends, share: rest as f32 / step as f32 });
+            }
+        }
+        Corners { mesh, elements, base, division, number, anchors, count: count as usize }
     }
 
     /// Calls back with every cell and the lattice corners around it.
@@ -117,48 +135,32 @@ impl<'a> Corners<'a> {
         out
     }
 
-    /// By number, how much the cells around each corner lie to one side of it: from 0 to 1.
-    fn one_sidedness(&self, cells: &[Cell]) -> Vec<f64> {
-        let mut sums = vec![(DVec3::ZERO, 0.0); self.count];
-        self.each_cell(|cell, around| {
-            let (t, _) = self.elements.place(self.elements.of_cell(cell).start);
-            let places = self.elements.cell_corners(cell).map(|uv| self.mesh.point(t, uv));
-            let (centre, weight) = ((places[0] + places[1] + places[2]) / 3.0, cells[cell].weight);
-            for (lattice, place) in around.into_iter().zip(places) {
-                let (way, length) = &mut sums[self.number[lattice] as usize];
-                *way += weight * (centre - place);
-                *length += weight * centre.distance(place);
-            }
-        });
-        let share = |(way, length): (DVec3, f64)| way.length() / length.max(f64::MIN_POSITIVE) / ONE_SIDED;
-        sums.into_iter().map(|sum| share(sum).min(1.0)).collect()
-    }
-
-    /// The mean of the cells around each corner; where these lie to one side, moved towards what keeps their values.
+    /// The mean of the cells around each corner, moved towards what keeps their values.
     pub fn fitted(&self, cells: &[Cell]) -> Vec<Bands> {
-        let mut means = self.mean(cells);
-        let mut missing = self.on_cells(&self.anchored(&means), cells);
-        for (missing, cell) in missing.iter_mut().zip(cells) {
-            (0..3).for_each(|band| missing.value[band] = cell.value[band] - missing.value[band]);
-        }
-        for ((mean, missing), one_sided) in means.iter_mut().zip(self.mean(&missing)).zip(self.one_sidedness(cells)) {
-            if let (Some(mean), Some(missing)) = (mean, missing) {
-                for (mean, missing) in mean.iter_mut().zip(missing) {
-                    *mean = within(*mean + MOVED * one_sided * missing, *mean);
+        let before = self.mean(cells);
+        let mut means = before.clone();
+        let slivers = self.slivers();
+        for _ in 0..MOVES {
+            let mut missing = self.on_cells(&self.anchored(&means), cells);
+            for (missing, cell) in missing.iter_mut().zip(cells) {
+                (0..3).for_each(|band| missing.value[band] = cell.value[band] - missing.value[band]);
+            }
+            for ((mean, missing), before) in means.iter_mut().zip(self.mean(&missing)).zip(&before) {
+                if let (Some(mean), Some(missing), Some(before)) = (mean, missing, before) {
+                    (0..3).for_each(|band| mean[band] = within(mean[band] + MOVED * missing[band], before[band]));
                 }
             }
+            self.equalize(&slivers, &mut means);
         }
-        self.equalize(&mut means);
         self.anchored(&means)
     }
 
     /// Makes the values on both sides of slivers equal: what the corner opposite to a cell's longest edge has more than the
     /// edge at its foot is taken from it by one half and added there by the other.
-    fn equalize(&self, means: &mut [Option<[f64; 3]>]) {
-        let slivers = self.slivers();
+    fn equalize(&self, slivers: &[([usize; 3], f64)], means: &mut [Option<[f64; 3]>]) {
         let before = means.to_vec();
         for _ in 0..EQUALIZED {
-            for &([a, b, tip], foot) in &slivers {
+            for &([a, b, tip], foot) in slivers {
                 let (Some(from), Some(to), Some(own)) = (means[a], means[b], means[tip]) else { continue };
                 let more: [f64; 3] = std::array::from_fn(|k| own[k] - from[k] - foot * (to[k] - from[k]));
                 let moved = |value: [f64; 3], share: f64| Some(std::array::from_fn(|k| value[k] + share * more[k]));
@@ -215,38 +217,19 @@ impl<'a> Corners<'a> {
 
     /// The value of every lattice corner: on the finer side of each edge the coarser side's interpolation.
     fn anchored(&self, values: &[Option<[f64; 3]>]) -> Vec<Bands> {
-        let mut out = Vec::with_capacity(self.number.len());
-        for (t, side) in sides(self.elements, self.division.len()) {
-            let k = self.division[t];
-            let at_edge = |place: u32, of: u32, e: usize| {
-                let key = shared_corner(self.mesh, t, side, edge_corner(e, place, of), of)?;
-                values[*self.shared.get(&key)? as usize]
-            };
-            for (i, j) in lattice(k) {
-                let value = match edge_of(i, j, k) {
-                    None => values[self.number[out.len()] as usize],
-                    Some((e, place)) => {
-                        let coarsest = self.edges[&edge_key(self.mesh, t, e)];
-                        // All divisions are powers of two, so coarse places are fine places.
-                        let step = k / coarsest;
-                        let (low, rest) = (place / step, place % step);
-                        let below = at_edge(low, coarsest, e);
-                        if rest == 0 {
-                            below
-                        } else {
-                            let share = f64::from(rest) / f64::from(step);
-                            let above = at_edge(low + 1, coarsest, e);
-                            below
-                                .zip(above)
-                                .map(|(a, b)| std::array::from_fn(|band| a[band] + share * (b[band] - a[band])))
-                        }
-                    }
-                };
-                out.push(value.map_or([0.0; 3], |v| v.map(|v| v as f32)));
-            }
-        }
-        out
+        let value = |Anchor { ends: [a, b], share }: &Anchor| {
+            let [Some(a), Some(b)] = [a, b].map(|end| values[*end as usize]) else { return [0.0; 3] };
+            std::array::from_fn(|band| (a[band] + f64::from(*share) * (b[band] - a[band])) as f32)
+        };
+        self.anchors.iter().map(value).collect()
     }
+}
+
+/// Between which numbers the value of a lattice corner lies, and where; both are its own where it is not interpolated.
+#[derive(Clone, Copy)]
+struct Anchor {
+    ends: [u32; 2],
+    share: f32,
 }
 
 /// The mean over a cell and what it weighs.
