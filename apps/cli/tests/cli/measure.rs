@@ -74,7 +74,7 @@ fn classic_methods_and_solvers_by_name() {
     let room = Room::new("classic");
     room.write("points.csv", "x,y,z,nx,ny,nz\n0.28,0,0.02,0,1,0\n0.1,0,0.5,0,1,0\n0.28,0.5487,0.1,0,-1,0\n");
     let measure = |further: &[&str]| -> Vec<f64> {
-        let call = ["measure", "--points", "points.csv", "--error", "20%", "--element-size", "0.1", "--json"];
+        let call = ["measure", "--points", "points.csv", "--error", "20%", "--element-size", "0.14", "--json"];
         let run = room.run([&call, further].concat());
         assert_eq!(run.code, Some(0), "{further:?}: {run:?}");
         let event: Value = serde_json::from_str(run.out.lines().last().unwrap()).unwrap();
