@@ -46,6 +46,10 @@ const EQUALIZED: usize = 4;
 /// they lie to one side, which is what a straight border takes where light is linear. Without it light beside a step rings.
 const BEYOND: f64 = 0.5;
 
+/// Nor to less than this part of its mean, nor to more than twice of it: where light changes fast along a border, as at the foot of a box
+/// that a shadow ends at, a corner had nearly none, a dark spot.
+const LEAST: f64 = 0.5;
+
 /// What a corner's value may be, by band.
 #[derive(Clone, Copy)]
 struct Bounds([[f64; 2]; 3]);
@@ -57,6 +61,14 @@ impl Bounds {
         Bounds(self.0.map(|[low, high]| {
             let more = part * (high - low);
             [(low - more).max(low.min(0.0)), high + more]
+        }))
+    }
+
+    /// Not too far from the mean of the cells.
+    fn beside(self, mean: [f64; 3]) -> Bounds {
+        Bounds(std::array::from_fn(|band| {
+            let ([low, high], mean) = (self.0[band], mean[band].abs());
+            [low.max(LEAST * mean), high.min(mean / LEAST)]
         }))
     }
 
@@ -234,8 +246,11 @@ impl<'a> Corners<'a> {
     /// The mean of the cells around each corner, moved towards what keeps their values.
     pub fn fitted(&self, fit: &Fit, cells: &[Cell]) -> Vec<Bands> {
         let mut means = self.mean(cells);
-        let widened = |(bounds, one_sided): (Bounds, &f64)| bounds.widened(BEYOND * (1.0 + one_sided));
-        let bounds: Vec<Bounds> = self.around(cells).into_iter().zip(&fit.one_sided).map(widened).collect();
+        let allowed = |((bounds, one_sided), mean): ((Bounds, &f64), &Option<[f64; 3]>)| {
+            bounds.widened(BEYOND * (1.0 + one_sided)).beside(mean.unwrap_or_default())
+        };
+        let around = self.around(cells).into_iter().zip(&fit.one_sided);
+        let bounds: Vec<Bounds> = around.zip(&means).map(allowed).collect();
         for step in 0..MOVES {
             let missing = self.mean(&self.missing(&means, cells));
             for (number, (mean, missing)) in means.iter_mut().zip(missing).enumerate() {
