@@ -103,7 +103,7 @@ impl Found {
 }
 
 /// What two halves differ by from their mean.
-fn halved([a, b]: [Bands; 2]) -> f32 {
+pub(crate) fn halved([a, b]: [Bands; 2]) -> f32 {
     0.5 * luminance(std::array::from_fn(|k| (a[k] - b[k]).abs()))
 }
 

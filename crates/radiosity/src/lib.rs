@@ -28,6 +28,7 @@ mod error;
 mod faces;
 pub mod factors;
 mod field;
+mod final_gather;
 mod footprint;
 mod judge;
 mod levels;

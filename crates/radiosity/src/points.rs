@@ -325,7 +325,7 @@ fn side_of(solution: &Solution, place: &Place) -> Option<Side> {
 
 /// Standard errors of receivers whose halves are `apart` from their mean, lx, unless that is no number: each one's own and those of
 /// others that are about as bright count the same.
-fn evened(light: &[Bands], apart: &[f32]) -> Vec<f32> {
+pub(crate) fn evened(light: &[Bands], apart: &[f32]) -> Vec<f32> {
     let mut order: Vec<usize> = (0..light.len()).filter(|i| apart[*i].is_finite()).collect();
     order.sort_by(|&i, &j| luminance(light[i]).total_cmp(&luminance(light[j])));
     let square = |i: usize| f64::from(apart[i]).powi(2);

@@ -1,7 +1,9 @@
-//! A picture of a solution: direct light found at places that pixels show (`pixels.rs`), indirect light from the continuous field.
+//! A picture of a solution: direct light found at places that pixels show (`pixels.rs`), indirect light gathered at some of them
+//! (`final_gather.rs`).
 
 use crate::answer::Station;
 use crate::edges::Edges;
+use crate::final_gather;
 use crate::measure::{certify, most_paths};
 use crate::monitor::{Monitor, Timed};
 use crate::pace::{self, Cost};
@@ -12,7 +14,6 @@ use radiosity_trace::Place;
 use radiosity_trace::sampling::{hash, unit};
 use radiosity_transport::Shadowing;
 use radiosity_view::{Audit, Auditor, Picture, ViewRays};
-use rayon::prelude::*;
 use std::time::Duration;
 
 /// How to make a picture.
@@ -86,8 +87,8 @@ impl View {
     }
 }
 
-/// Looks at a solution. Cells that are seen gather their indirect light until its noise is below the error that the solution was
-/// made for, as far as some thousands of rays bring it. Within a deadline that leaves too little for this, cells gather and pixels are
+/// Looks at a solution. Places that are seen gather their indirect light, as do cells of surfaces that are not flat, until its noise is well below
+/// the error that the solution was made for, as far as some hundreds or thousands of rays bring it. Within a deadline that leaves too little for this, these gather and pixels are
 /// lit with fewer rays, for which a part of them is timed; time for the audit is left.
 ///
 /// # Errors
@@ -98,29 +99,20 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     let (cast, view) = pace::timed(|| cast(solution, camera, options, monitor));
     let stations: Vec<Station> =
         view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
-    let mut looks = vec![0; solution.elements.cells()];
-    for Station { place, uv, side } in &stations {
-        if let Some(element) = solution.elements.at(place.triangle, uv.x as f32, uv.y as f32, *side) {
-            looks[solution.elements.cell(element)] += 1;
-        }
-    }
-    let light = baked.received.clone();
     let after = SEEN * baked.audit_seconds() + ENCODED * cast;
     let left = || pace::left(monitor).map(|left| (left - after).max(0.0));
     let tiles = Tiles::new(&view);
-    let field = match left() {
-        None => solution.field_on(&looks, light, baked.error, monitor)?,
+    let (indirect, is_gathered) = match left() {
+        None => final_gather::indirect(baked, &view, &stations, monitor)?,
         Some(seconds) => {
             let lit = cost(solution, &stations, &options.shadowing, monitor)?;
             let lit = (tiles.part() + SOFTENED) * lit.seconds(f64::from(options.shadowing.rays));
             // Timing took some of it.
             let seconds = left().unwrap_or(seconds);
-            let gather = (seconds - lit).max(GATHERED * seconds);
-            solution.field_on(&looks, light, baked.error, &Timed::new(monitor, Duration::from_secs_f64(gather)))?
+            let gather = Duration::from_secs_f64((seconds - lit).max(GATHERED * seconds));
+            final_gather::indirect(baked, &view, &stations, &Timed::new(monitor, gather))?
         }
     };
-    let received = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
-    let indirect: Vec<Bands> = stations.par_iter().map(received).collect();
     // Timed once more: others may have come or gone since.
     let cost = left().map(|_| cost(solution, &stations, &options.shadowing, monitor)).transpose()?;
     let mut shadowing = options.shadowing;
@@ -173,7 +165,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
             (share[pixel], illuminance[pixel]) = (response, luminance(*e));
         }
     }
-    is_hurried |= !is_whole || shadowing.rays < options.shadowing.rays;
+    is_hurried |= !is_gathered || !is_whole || shadowing.rays < options.shadowing.rays;
     Ok(View { picture: view.picture(&irradiance), illuminance, watched, is_hurried })
 }
 

@@ -65,7 +65,7 @@ pub struct Solution<'a> {
     pub(crate) is_cut: bool,
     /// What other methods than rays found of F between elements.
     matrix: Option<Matrix>,
-    options: SolveOptions,
+    pub(crate) options: SolveOptions,
     /// X by id: reflected and not directly carried radiosity of elements, then the sky's, then nothing.
     values: Vec<[f32; 4]>,
     irradiance: Vec<Bands>,

@@ -1,0 +1,433 @@
+//! Indirect light of a picture by a final gather (Reichert 1992, "A two-pass radiosity method driven by lights and viewer position"; catalogue 63):
+//! places that pixels show look up what a solution has around them, so that contacts and corners are as sharp as pixels, however coarse
+//! its elements are.
+//!
+//! One place in a block of a few pixels gathers for each surface that the block shows; those of a plane share what they found ([`Planes`]), and the
+//! noisy ones send more rays ([`crate::allocation`]). Between them light is interpolated over the picture. Surfaces that are not flat have the continuous field of the elements:
+//! places with normals of their own share with no other, and would be as grainy as each is noisy.
+
+use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, halved, mean};
+use crate::answer::Station;
+use crate::pace::{self, Cost};
+use crate::pixels::{lies_on, pixel, seen};
+use crate::points::evened;
+use crate::{Baked, Error, Monitor, Solution, Timed};
+use radiosity_scene::{Bands, Side, luminance};
+use radiosity_trace::Place;
+use radiosity_view::picture::{ViewRays, shading_normal};
+use radiosity_view::{FLAT, Finding, Planes, Pooled};
+use rayon::prelude::*;
+use smallvec::SmallVec;
+use std::collections::HashMap;
+use std::time::Duration;
+
+/// Places that gather for a picture, about; of larger pictures blocks are wider. Each takes about a kilobyte while it shares.
+const PLACES: f64 = 400_000.0;
+
+/// First rays of each, and the fewest where there is little time. What is smooth needs no more: it shares with hundreds.
+const FIRST: usize = 32;
+const FEWEST: usize = 16;
+
+/// Most rays of each, in the mean: where light comes by bright paths that few rays meet, more would take minutes.
+const MOST: f64 = 256.0;
+
+/// Rays of the part that is timed.
+const TIMED: usize = 64;
+
+/// Noise that is left, relative to the error asked: in a furnished office at 2 % twice as much leaves the picture 2.0 % off instead of 1.35. And the most,
+/// whatever is asked: it is seen.
+const NOISE: f64 = 0.4;
+const MOST_NOISE: f64 = 0.01;
+
+/// Noise of a place relative to its own light at most, in those of all; and the part of the mean below which light counts as if it was as much.
+const VISIBLE: f64 = 4.0;
+const DARK: f64 = 0.1;
+
+/// Noise within this of what it is to be is not worth another step: what is shared falls more slowly than what each has.
+const ENOUGH: f64 = 1.2;
+
+/// Steps by which rays become more, at most.
+const STEPS: u32 = 4;
+
+/// Within a time limit a step is worth its while from so many times as many rays on.
+const WORTH: f64 = 1.1;
+
+/// Squares around a block, to each side, in which others of its surface are looked for.
+const AROUND: u32 = 2;
+
+/// How many times what noise leaves of the light around is more than it: what the field misses is told where it is twice that.
+const SURE: f32 = 4.0;
+
+/// Weight of a place whose block is not the pixel's own and whose tent ends before it, beside 1 at its pixel: of a block's one place something is
+/// always there.
+const LEAST_WEIGHT: f32 = 1e-3;
+
+/// A surface within a square of some pixels: the places that it shows there, and the one that gathers for them.
+struct Block {
+    square: [u32; 2],
+    places: SmallVec<[u32; 4]>,
+    chosen: u32,
+}
+
+/// Light by block.
+struct Gathered {
+    /// What all shared, lx per band.
+    light: Vec<Bands>,
+    /// What either half of the rays of each found.
+    halves: Vec<[Bands; 2]>,
+    /// Whether there was time for all rays.
+    is_whole: bool,
+}
+
+/// What of a picture gathers, and the rest.
+struct Blocks<'a> {
+    view: &'a ViewRays,
+    /// Pixels along the side of a square.
+    side: u32,
+    blocks: Vec<Block>,
+    /// Those of the same surface in the squares around, by block.
+    beside: Vec<SmallVec<[u32; 24]>>,
+    /// Whether a place gathers, by number.
+    gathers: Vec<bool>,
+}
+
+/// Indirect light of all that is seen, and whether there was time to gather it as it should be. Of a solution by a matrix of form factors the field is
+/// shown as it is: what the method does not see is not put right.
+///
+/// # Errors
+/// [`Error::Stopped`]; [`Error::File`].
+pub(crate) fn indirect(
+    baked: &Baked,
+    view: &ViewRays,
+    stations: &[Station],
+    monitor: &dyn Monitor,
+) -> Result<(Vec<Bands>, bool), Error> {
+    let solution = &baked.solution;
+    let blocks = Blocks::new(solution, view, stations);
+    // Within a time limit the field has half of the time, where it is shown, too.
+    let own = match pace::left(monitor) {
+        Some(left) if !solution.options.looked_up => Timed::new(monitor, Duration::from_secs_f64(0.5 * left)),
+        _ => Timed::unlimited(monitor),
+    };
+    let gathered = blocks.gathered(baked, stations, &own)?;
+    let is_whole = gathered.as_ref().map_or(blocks.blocks.is_empty(), |gathered| gathered.is_whole);
+    // Elements that are only looked up make no field that is worth a look.
+    let is_shown = |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.gathers[place]);
+    let mut looks = vec![0; solution.elements.cells()];
+    for Station { place, uv, side } in (0..stations.len()).filter(|place| is_shown(*place)).map(|i| stations[i]) {
+        if let Some(element) = solution.elements.at(place.triangle, uv.x as f32, uv.y as f32, side) {
+            looks[solution.elements.cell(element)] += 1;
+        }
+    }
+    let mut light = vec![[0.0; 3]; stations.len()];
+    if looks.iter().any(|looks| *looks > 0) {
+        let field = solution.field_on(&looks, baked.received.clone(), baked.error, monitor)?;
+        light.par_iter_mut().zip(stations).enumerate().filter(|(i, _)| is_shown(*i)).for_each(|(_, (light, s))| {
+            *light = field.at(s.place.triangle as usize, s.uv, s.side);
+        });
+    }
+    if let Some(Gathered { light: mut found, halves, .. }) = gathered {
+        if !solution.options.looked_up {
+            let field: Vec<Bands> = blocks.blocks.iter().map(|block| light[block.chosen as usize]).collect();
+            blocks.unless_sure(&mut found, &field, &halves);
+        }
+        blocks.spread(&found, &mut light);
+    }
+    Ok((light, is_whole))
+}
+
+/// Whether a triangle receives with its own normal all over.
+fn is_flat(solution: &Solution, Station { place, side, .. }: &Station) -> bool {
+    let (tracer, triangle) = (solution.tracer(), place.triangle as usize);
+    let own = tracer.mesh.normal(triangle) * if *side == Side::Front { 1.0 } else { -1.0 };
+    let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
+    corners.into_iter().all(|uv| shading_normal(tracer, triangle, uv.into(), *side).dot(own) > FLAT)
+}
+
+impl<'a> Blocks<'a> {
+    fn new(solution: &Solution, view: &'a ViewRays, stations: &[Station]) -> Blocks<'a> {
+        let gathers = |station: &Station| solution.options.form_factors.is_none() && is_flat(solution, station);
+        let gathers: Vec<bool> = stations.par_iter().map(gathers).collect();
+        let count = gathers.iter().filter(|gathers| **gathers).count() as f64;
+        let side = (count / PLACES).sqrt().ceil().max(1.0) as u32;
+        let first = |row: u32| view.seen.partition_point(|seen| seen.pixel < row * view.width) as u32;
+        let of_row = |row: u32| {
+            let places = (first(row * side)..first((row + 1) * side)).filter(|place| gathers[*place as usize]);
+            Block::all(view, places, side)
+        };
+        let rows: Vec<Vec<Block>> = (0..view.height.div_ceil(side)).into_par_iter().map(of_row).collect();
+        let blocks: Vec<Block> = rows.into_iter().flatten().collect();
+        let mut at: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
+        for (number, block) in (0..).zip(&blocks) {
+            at.entry(block.square).or_default().push(number);
+        }
+        let beside = |(own, block): (u32, &Block)| {
+            let [x, y] = block.square;
+            let low = [x, y].map(|k| k.saturating_sub(AROUND));
+            let squares = (low[1]..=y + AROUND).flat_map(|y| (low[0]..=x + AROUND).map(move |x| [x, y]));
+            let place = seen(view, block.chosen);
+            let is_beside = |other: &u32| *other != own && lies_on(place, seen(view, blocks[*other as usize].chosen));
+            squares.filter_map(|square| at.get(&square)).flatten().copied().filter(is_beside).collect()
+        };
+        let beside = (0..blocks.len() as u32).into_par_iter().zip(&blocks).map(beside).collect();
+        Blocks { view, side, blocks, beside, gathers }
+    }
+
+    /// Leaves in its place what the `field` of elements has, as far as what blocks around `found` does not tell more than their noise: what
+    /// bright paths leave, if few rays meet them, is seen on walls, and the field is smooth.
+    fn unless_sure(&self, found: &mut [Bands], field: &[Bands], halves: &[[Bands; 2]]) {
+        let sure = |number: usize| -> f32 {
+            let (mut off, mut noise) = (0.0, 0.0);
+            for i in self.beside[number].iter().map(|other| *other as usize).chain([number]) {
+                off += luminance(mean(halves[i])) - luminance(field[i]);
+                noise += halved(halves[i]).powi(2);
+            }
+            if off == 0.0 { 0.0 } else { (1.0 - SURE * noise / (off * off)).max(0.0) }
+        };
+        let sure: Vec<f32> = (0..found.len()).into_par_iter().map(sure).collect();
+        let evened = |(number, found): (usize, &mut Bands)| {
+            let beside = &self.beside[number];
+            let sum = beside.iter().map(|other| sure[*other as usize]).sum::<f32>() + sure[number];
+            let part = sum / (beside.len() + 1) as f32;
+            *found = std::array::from_fn(|k| field[number][k] + part * (found[k] - field[number][k]));
+        };
+        found.par_iter_mut().enumerate().for_each(evened);
+    }
+
+    /// Light that the chosen places gather; nothing where time does not do for the fewest rays.
+    fn gathered(&self, baked: &Baked, stations: &[Station], monitor: &dyn Monitor) -> Result<Option<Gathered>, Error> {
+        let solution = &baked.solution;
+        let at: Vec<Station> = self.blocks.iter().map(|block| stations[block.chosen as usize]).collect();
+        if at.is_empty() {
+            return Ok(None);
+        }
+        let places: Vec<Place> = at.iter().map(|station| station.place).collect();
+        let pixels: Vec<f64> = self.blocks.iter().map(|block| block.places.len() as f64).collect();
+        let mut first = FIRST;
+        if let Some(left) = pace::left(monitor) {
+            let cost = cost(solution, &places, monitor)?;
+            if !pace::suffices(left, cost.seconds(FEWEST as f64)) {
+                return Ok(None);
+            }
+            first = cost.rays(left, [FEWEST, FIRST].map(|rays| rays as f64)) as usize;
+        }
+
+        // Once the noisiest have had their share, what counts is the noise of all.
+        let none = vec![f64::INFINITY; at.len()];
+
+        let planes = Planes::new(solution.tracer().mesh, &solution.elements);
+        let share = |found: &Found, halves: &[[Bands; 2]]| -> Vec<Pooled> {
+            let finding = |(i, Station { place, side, .. }): (usize, &Station)| Finding {
+                point: place.point,
+                triangle: place.triangle as usize,
+                side: *side,
+                light: found.light[i],
+                noise: halved(halves[i]),
+                weight: 1.0,
+            };
+            planes.pooled(&at.iter().enumerate().map(finding).collect::<Vec<_>>())
+        };
+        let (seconds, halves) = pace::timed(|| solution.halves_at(&places, first, 0, monitor));
+        let each = seconds / first as f64;
+        let first_halves = halves?;
+        let mut found = Found::of_halves(&first_halves, first as u32, evened);
+        // Those of places around together tell the noise, bright paths and all; what is evened out by light takes part of these for detail.
+        let mut halves: Vec<[Bands; 2]> = first_halves.iter().map(|half| half.light).collect();
+        let mut pooled = share(&found, &halves);
+        // Noise counts as the audit has it and as the eye does, relative to what light there is.
+        let direct = |place: &Place| solution.element_at(place).map_or([0.0; 3], |e| solution.columns.mean(e as usize));
+        let all = |(place, pooled): (&Place, &Pooled)| f64::from(luminance(direct(place)) + luminance(pooled.light));
+        let size: Vec<f64> = places.iter().zip(&pooled).map(all).collect();
+        let count: f64 = pixels.iter().sum();
+        let mean_of = |of: &dyn Fn(f64) -> f64| size.iter().zip(&pixels).map(|(e, n)| n * of(*e)).sum::<f64>() / count;
+        let (average, square) = (mean_of(&|e| e), mean_of(&|e| e * e));
+        let seen: Vec<f64> = size.iter().map(|e| e.max(DARK * average)).collect();
+        let weight = |(e, n): (&f64, &f64)| 0.5 * n * (1.0 / square + 1.0 / (e * (e + average)));
+        let weights: Vec<f64> = seen.iter().zip(&pixels).map(weight).collect();
+        let asked = (NOISE * baked.error).min(MOST_NOISE);
+        let target = asked * (count / weights.iter().sum::<f64>()).sqrt();
+        let ceilings: Vec<f64> = seen.iter().map(|e| VISIBLE * asked * e).collect();
+        let mut is_whole = first == FIRST;
+        for step in 1..=STEPS {
+            let noise = |(pooled, noise): (&Pooled, &f32)| if pooled.own < 1.0 { pooled.spread } else { *noise };
+            let spread: Vec<f32> = pooled.iter().zip(&found.noise).map(noise).collect();
+            let squares = spread.iter().zip(&weights).map(|(spread, weight)| weight * f64::from(*spread).powi(2));
+            if step > 1 && (squares.sum::<f64>() / count).sqrt() <= ENOUGH * asked {
+                break;
+            }
+            let ceilings = if step == 1 { &ceilings } else { &none };
+            let mut times = growth(&spread, &weights, ceilings, target, GATHERED_POWER);
+            let had = found.rays.iter().map(|rays| f64::from(*rays)).sum::<f64>() / at.len() as f64;
+            let mut most = MOST / had;
+            if let Some(left) = pace::left(monitor) {
+                let wanted = (times.iter().sum::<f64>() / times.len() as f64).min(most);
+                most = most.min(1.0 + pace::affordable(left, each) as f64 / had);
+                is_whole &= wanted <= most;
+            }
+            if most < WORTH {
+                break;
+            }
+            curb(&mut times, Some(most));
+            let before = found.rays.clone();
+            let any = found.grow((&times, GATHERED_POWER), |own, rays| {
+                let at: Vec<Place> = own.iter().map(|i| places[*i]).collect();
+                let more = solution.halves_at(&at, rays as usize, step, monitor)?;
+                for (&i, more) in own.iter().zip(&more) {
+                    let part = rays as f32 / (before[i] + rays) as f32;
+                    for (own, new) in halves[i].iter_mut().zip(more.light) {
+                        *own = std::array::from_fn(|k| own[k] + part * (new[k] - own[k]));
+                    }
+                }
+                Ok(Lit::sampled(more.into_iter().map(|half| mean(half.light)).collect()))
+            })?;
+            if !any {
+                break;
+            }
+            pooled = share(&found, &halves);
+        }
+        Ok(Some(Gathered { light: pooled.into_iter().map(|p| p.light).collect(), halves, is_whole }))
+    }
+
+    /// Light of all places of the blocks, between those of the chosen ones on the same surface in these and in those around.
+    fn spread(&self, found: &[Bands], light: &mut [Bands]) {
+        let of_block = |(number, block): (usize, &Block)| -> SmallVec<[(u32, Bands); 4]> {
+            let of_place = |&place: &u32| {
+                let own = self.tent(place, block.chosen).max(LEAST_WEIGHT);
+                let (mut sum, mut total) = (found[number].map(|e| own * e), own);
+                for &other in &self.beside[number] {
+                    let weight = self.tent(place, self.blocks[other as usize].chosen);
+                    (0..3).for_each(|band| sum[band] += weight * found[other as usize][band]);
+                    total += weight;
+                }
+                (place, sum.map(|sum| sum / total))
+            };
+            block.places.iter().map(of_place).collect()
+        };
+        let all: Vec<_> = self.blocks.par_iter().enumerate().map(of_block).collect();
+        all.into_iter().flatten().for_each(|(place, found)| light[place as usize] = found);
+    }
+
+    /// What one place counts at another: 1 at its own pixel, less towards those a block's side away.
+    fn tent(&self, place: u32, chosen: u32) -> f32 {
+        let (a, b) = (pixel(self.view, place), pixel(self.view, chosen));
+        [0, 1].map(|k| (1.0 - a[k].abs_diff(b[k]) as f32 / self.side as f32).max(0.0)).into_iter().product()
+    }
+}
+
+impl Block {
+    /// Blocks of some places of the picture.
+    fn all(view: &ViewRays, places: impl Iterator<Item = u32>, side: u32) -> Vec<Block> {
+        let mut blocks: Vec<Block> = Vec::new();
+        let mut at: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
+        for place in places {
+            let of = at.entry(pixel(view, place).map(|k| k / side)).or_default();
+            let is_own = |number: &u32| lies_on(seen(view, blocks[*number as usize].places[0]), seen(view, place));
+            match of.iter().copied().find(is_own) {
+                Some(number) => blocks[number as usize].places.push(place),
+                None => {
+                    of.push(blocks.len() as u32);
+                    let square = pixel(view, place).map(|k| k / side);
+                    blocks.push(Block { square, places: SmallVec::from_slice(&[place]), chosen: place });
+                }
+            }
+        }
+        // The one nearest to the middle: so they are as far apart everywhere.
+        for block in &mut blocks {
+            let from_middle = |place: &u32| {
+                let at = pixel(view, *place);
+                [0, 1].map(|k| (at[k] % side).abs_diff(side / 2).pow(2)).into_iter().sum::<u32>()
+            };
+            block.chosen = block.places.iter().copied().min_by_key(from_middle).unwrap_or(block.chosen);
+        }
+        blocks
+    }
+}
+
+/// What places take to gather by their rays, by a part of them.
+fn cost(solution: &Solution, places: &[Place], monitor: &dyn Monitor) -> Result<Cost, Error> {
+    let (some, parts) = pace::sample(places);
+    let time = |rays: usize| {
+        let (seconds, halves) = pace::timed(|| solution.halves_at(&some, rays, 0, monitor).map(drop));
+        halves.map(|()| (rays as f64, seconds))
+    };
+    Ok(Cost::new([time(FEWEST)?, time(TIMED)?], parts))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BakeOptions, Mesh, SolveOptions, Tracer, bake, cornell_box};
+    use radiosity_trace::sampling::{hash, unit};
+
+    /// What a camera sees of the Cornell box, whose elements are as wide as a quarter of its walls, is nearer to what many rays gather than the field of
+    /// these elements, and about half as far off.
+    #[test]
+    fn catalogue_63_contacts_are_as_sharp_as_pixels() {
+        let scene = cornell_box();
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let solve = SolveOptions { element_size: Some(0.14), ..SolveOptions::default() };
+        let options = BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() };
+        let baked = bake(&tracer, &options, &()).unwrap();
+        let view = ViewRays::new(&tracer, &scene.cameras[0], 96, 96);
+        let stations: Vec<Station> =
+            view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
+        let (light, is_whole) = indirect(&baked, &view, &stations, &()).unwrap();
+        assert!(is_whole);
+
+        let some: Vec<usize> = (0..stations.len()).step_by(16).collect();
+        let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
+        let truth = baked.solution.halves_at(&places, 4096, 99, &()).unwrap();
+        let off = |light: &dyn Fn(usize) -> Bands| {
+            let squares = some.iter().zip(&truth).map(|(i, truth)| {
+                let truth = f64::from(luminance(mean(truth.light)));
+                [(f64::from(luminance(light(*i))) - truth).powi(2), truth.powi(2)]
+            });
+            let [off, all] = squares.fold([0.0; 2], |sum, square| [sum[0] + square[0], sum[1] + square[1]]);
+            (off / all).sqrt()
+        };
+        let gathered = off(&|i| light[i]);
+        let field = off(&|i| baked.field.at(stations[i].place.triangle as usize, stations[i].uv, stations[i].side));
+        assert!(gathered < 0.55 * field && gathered < 0.05, "{gathered} instead of {field}");
+    }
+
+    /// Places in rows of [`SIDE`], each beside those of the 24 around that there are.
+    const SIDE: usize = 40;
+
+    fn beside(own: usize) -> SmallVec<[u32; 24]> {
+        let near = |other: &usize| {
+            let apart = |a: usize, b: usize| a.abs_diff(b) <= 2;
+            *other != own && apart(own % SIDE, other % SIDE) && apart(own / SIDE, other / SIDE)
+        };
+        (0..SIDE * SIDE).filter(near).map(|other| other as u32).collect()
+    }
+
+    /// Bright paths that one ray in a thousand meets do not show where the field is right; where it is wrong what was gathered stays.
+    #[test]
+    fn the_field_gives_way_to_what_is_sure() {
+        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
+        let beside: Vec<_> = (0..SIDE * SIDE).map(beside).collect();
+        let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
+        let draw = |i: usize, k: u32| unit(hash(hash(i as u32) ^ k));
+        let half = |i: usize, k: u32| {
+            let bright = if draw(i, k + 2) < 0.005 { 8.0 } else { 0.0 };
+            [1.0 + 0.2 * (draw(i, k) - 0.5) + bright; 3]
+        };
+        let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(|i| [half(i, 0), half(i, 1)]).collect();
+        // As if all shared with those beside them.
+        let shared = |i: usize| -> Bands {
+            let own = blocks.beside[i].iter().map(|other| mean(halves[*other as usize])[0]);
+            [own.sum::<f32>() / blocks.beside[i].len() as f32; 3]
+        };
+        let gathered: Vec<Bands> = (0..halves.len()).map(shared).collect();
+        let off =
+            |light: &[Bands]| (light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>() / light.len() as f32).sqrt();
+        let mut with_right = gathered.clone();
+        blocks.unless_sure(&mut with_right, &vec![[1.0; 3]; halves.len()], &halves);
+        assert!(off(&with_right) < 0.2 * off(&gathered), "{} of {}", off(&with_right), off(&gathered));
+        let field = vec![[3.0; 3]; halves.len()];
+        let mut with_wrong = gathered.clone();
+        blocks.unless_sure(&mut with_wrong, &field, &halves);
+        assert!(off(&with_wrong) < 0.1 * off(&field), "{} of {}", off(&with_wrong), off(&field));
+    }
+}
