@@ -55,6 +55,9 @@ const WORTH: f64 = 1.1;
 /// Squares around a block, to each side, in which others of its surface are looked for.
 const AROUND: u32 = 2;
 
+/// How often the noise of blocks is evened out with that of those around.
+const FARTHER: usize = 4;
+
 /// How many times what noise leaves of the light around is more than it: what the field misses is told where it is twice that.
 const SURE: f32 = 4.0;
 
@@ -173,25 +176,33 @@ impl<'a> Blocks<'a> {
         Blocks { view, side, blocks, beside, gathers }
     }
 
+    /// Means over each block and those beside it.
+    fn around(&self, values: &[f32]) -> Vec<f32> {
+        let mean = |(own, beside): (&f32, &SmallVec<[u32; 24]>)| {
+            let sum = beside.iter().map(|other| values[*other as usize]).sum::<f32>() + own;
+            sum / (beside.len() + 1) as f32
+        };
+        values.par_iter().zip(&self.beside).map(mean).collect()
+    }
+
     /// Leaves in its place what the `field` of elements has, as far as what blocks around `found` does not tell more than their noise: what
     /// bright paths leave, if few rays meet them, is seen on walls, and the field is smooth.
     fn unless_sure(&self, found: &mut [Bands], field: &[Bands], halves: &[[Bands; 2]]) {
-        let sure = |number: usize| -> f32 {
-            let (mut off, mut noise) = (0.0, 0.0);
-            for i in self.beside[number].iter().map(|other| *other as usize).chain([number]) {
-                off += luminance(mean(halves[i])) - luminance(field[i]);
-                noise += halved(halves[i]).powi(2);
-            }
-            if off == 0.0 { 0.0 } else { (1.0 - SURE * noise / (off * off)).max(0.0) }
+        let off = |(halves, field): (&[Bands; 2], &Bands)| luminance(mean(*halves)) - luminance(*field);
+        let off = self.around(&halves.iter().zip(field).map(off).collect::<Vec<f32>>());
+        // From farther around, as there need not be a bright path in a window where there might be.
+        let mut noise: Vec<f32> = halves.iter().map(|halves| halved(*halves).powi(2)).collect();
+        for _ in 0..FARTHER {
+            noise = self.around(&noise);
+        }
+        let sure = |number: usize| {
+            let noise = noise[number] / (self.beside[number].len() + 1) as f32;
+            if off[number] == 0.0 { 0.0 } else { (1.0 - SURE * noise / off[number].powi(2)).max(0.0) }
         };
-        let sure: Vec<f32> = (0..found.len()).into_par_iter().map(sure).collect();
-        let evened = |(number, found): (usize, &mut Bands)| {
-            let beside = &self.beside[number];
-            let sum = beside.iter().map(|other| sure[*other as usize]).sum::<f32>() + sure[number];
-            let part = sum / (beside.len() + 1) as f32;
-            *found = std::array::from_fn(|k| field[number][k] + part * (found[k] - field[number][k]));
-        };
-        found.par_iter_mut().enumerate().for_each(evened);
+        let sure = self.around(&(0..found.len()).map(sure).collect::<Vec<f32>>());
+        for ((found, field), sure) in found.iter_mut().zip(field).zip(sure) {
+            *found = std::array::from_fn(|k| field[k] + sure * (found[k] - field[k]));
+        }
     }
 
     /// Light that the chosen places gather; nothing where time does not do for the fewest rays.
@@ -375,9 +386,9 @@ mod tests {
         let (light, is_whole) = indirect(&baked, &view, &stations, &()).unwrap();
         assert!(is_whole);
 
-        let some: Vec<usize> = (0..stations.len()).step_by(16).collect();
+        let some: Vec<usize> = (0..stations.len()).step_by(32).collect();
         let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
-        let truth = baked.solution.halves_at(&places, 4096, 99, &()).unwrap();
+        let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
         let off = |light: &dyn Fn(usize) -> Bands| {
             let squares = some.iter().zip(&truth).map(|(i, truth)| {
                 let truth = f64::from(luminance(mean(truth.light)));

@@ -4,7 +4,7 @@ use super::glb::{Builder, Target};
 use super::materials::{Materials, unit};
 use super::mixture::{Mixture, mixture};
 use super::{Light, LitPrimitive, LitVertex, Style, WriteError, lamps, vertices};
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{
     AlphaMode, Camera, Material, Object, PointLight, Projection, Scene, Texture, TextureRef, Up, Wrap,
 };
@@ -42,6 +42,7 @@ fn build(
     let mut materials = Materials::new(scene, style, &mut builder);
     let layered: BTreeSet<usize> = primitives.iter().filter(|lit| lit.flipped).map(|lit| lit.object).collect();
 
+    let origin = origin(scene);
     // A root turns the scene so that its zenith is glTF's +Y.
     let mut children = Vec::new();
     let root = builder.push("nodes", json!({ "name": if scene.name.is_empty() { "scene" } else { &scene.name } }));
@@ -58,19 +59,31 @@ fn build(
         }
         let mut parts = Vec::new();
         for lit in lit.into_iter().filter(|lit| !lit.triangles.is_empty()) {
-            parts.push(part(&mut builder, &mut materials, scene, style, object, lit, layered.contains(&index)));
+            parts.push(part(
+                &mut builder,
+                &mut materials,
+                scene,
+                style,
+                (object, origin),
+                lit,
+                layered.contains(&index),
+            ));
         }
         if parts.is_empty() {
             continue;
         }
         let mesh = builder.push("meshes", json!({ "name": object.name, "primitives": parts }));
-        children.push(builder.push("nodes", json!({ "name": object.name, "mesh": mesh })));
+        let mut node = json!({ "name": object.name, "mesh": mesh });
+        if origin != DVec3::ZERO {
+            node["translation"] = json!(origin.to_array());
+        }
+        children.push(builder.push("nodes", node));
     }
     materials.settle(&mut builder, false);
     for camera in &scene.cameras {
         let json = self::camera(camera);
         let index = builder.push("cameras", json);
-        let matrix = camera.world_from_camera.to_cols_array().map(|x| x as f32);
+        let matrix = camera.world_from_camera.to_cols_array();
         children.push(builder.push("nodes", json!({ "name": camera.name, "camera": index, "matrix": matrix })));
     }
     children.extend(put(&mut builder, &scene.lights));
@@ -79,13 +92,24 @@ fn build(
             root["children"] = json!(children);
         }
         if scene.up == Up::Z {
-            let half = std::f32::consts::FRAC_1_SQRT_2;
+            let half = std::f64::consts::FRAC_1_SQRT_2;
             root["rotation"] = json!([-half, 0.0, 0.0, half]);
         }
     }
     builder.json.insert("scene".into(), 0.into());
     builder.push("scenes", json!({ "nodes": [root] }));
     builder.finish()
+}
+
+/// From here on single precision does not do for places: their distance is a tenth of a millimetre.
+const FAR: f64 = 1000.0;
+
+/// Where positions are written from: the scene's own origin, or where that lies far away, as of models in national coordinates, whole metres in their middle.
+pub(super) fn origin(scene: &Scene) -> DVec3 {
+    let bounds = |(low, high): (DVec3, DVec3), p: &DVec3| (low.min(*p), high.max(*p));
+    let (low, high) = scene.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), bounds);
+    let middle = (0.5 * (low + high)).round();
+    if middle.is_finite() && middle.abs().max_element() > FAR { middle } else { DVec3::ZERO }
 }
 
 /// An object that got no light: all its triangles as they are.
@@ -106,7 +130,7 @@ fn part(
     materials: &mut Materials<'_>,
     scene: &Scene,
     style: &Style,
-    object: &Object,
+    (object, origin): (&Object, DVec3),
     lit: &LitPrimitive,
     single_sided: bool,
 ) -> Value {
@@ -116,7 +140,7 @@ fn part(
         attributes.insert(name.to_owned(), vertices::from_scene(builder, lit, name, &values, width).into());
     };
     let positions = &scene.positions[own.clone()];
-    add("POSITION", positions.iter().flat_map(|p| p.as_vec3().to_array()).collect(), 3);
+    add("POSITION", positions.iter().flat_map(|p| (*p - origin).as_vec3().to_array()).collect(), 3);
     let normals = &scene.normals[own.clone()];
     // Where one is missing none are written: viewers then shade flat.
     if normals.iter().all(|n| *n != Vec3::ZERO) {

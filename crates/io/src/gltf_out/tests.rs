@@ -595,3 +595,25 @@ fn a_dark_scene_keeps_its_lamps_and_cameras() {
     let place = back.cameras[0].world_from_camera.w_axis.truncate();
     assert!(place.distance(eye) < 1e-5, "{place}");
 }
+
+/// In national coordinates, hundreds of kilometres from the origin, single precision has steps of half a metre: a room is written from its middle and
+/// read back where it is, to a hundredth of a millimetre.
+#[test]
+fn places_far_from_the_origin_are_kept() {
+    let at = DVec3::new(691_000.25, -12.5, -5_334_000.125);
+    let corners = [DVec3::ZERO, DVec3::new(4.003, 0.0, 0.0), DVec3::new(0.0, 2.601, 3.007)];
+    for up in [Up::Y, Up::Z] {
+        let mut scene = Scene { materials: vec![Material::default()], up, ..Scene::default() };
+        scene.add_triangles("far", 0, &[corners.map(|corner| at + corner)]);
+        let back = load(&plain::dark(&scene).unwrap()).scene;
+        // A zenith along z comes back along y.
+        let turned = |p: DVec3| if up == Up::Z { DVec3::new(p.x, p.z, -p.y) } else { p };
+        for (read, written) in back.positions.iter().zip(&scene.positions) {
+            assert!(read.distance(turned(*written)) < 1e-5, "{read} for {written}");
+        }
+        assert_eq!(back.positions.len(), 3);
+    }
+    let mut near = Scene { materials: vec![Material::default()], ..Scene::default() };
+    near.add_triangles("near", 0, &[corners]);
+    assert_eq!(plain::origin(&near), DVec3::ZERO);
+}
