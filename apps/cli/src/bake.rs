@@ -211,7 +211,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     }
     let written = (&audit, rounds, lightmap, is_hurried);
     let report = Report::new(&input, &arguments.solve, (&baked, view.as_ref(), exposure), written, &files, progress)?;
-    report.error.unlit(&input.scene).iter().for_each(|warning| progress.say(warning));
+    report.error.unlit(&input.scene, &baked.audit).iter().for_each(|warning| progress.say(warning));
     for path in &arguments.report {
         let text = match is_json(path) {
             true => serde_json::to_string_pretty(&report).map_err(Failure::work)?,

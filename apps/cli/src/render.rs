@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             ),
         };
     }
-    error.unlit(&input.scene).iter().for_each(|warning| progress.say(warning));
+    error.unlit(&input.scene, &baked.audit).iter().for_each(|warning| progress.say(warning));
     let shown = baked.solution.displayed(Some(exposure));
     progress.overtime().iter().for_each(|note| progress.say(note));
     if global.json {

@@ -124,11 +124,14 @@ impl ErrorReport {
         }
     }
 
-    /// What is said where lamps light nothing at all of a scene that has some.
-    pub fn unlit(&self, scene: &Scene) -> Option<&'static str> {
-        (self.points > 0 && self.mean_illuminance == 0.0 && self.estimated == 0.0 && !faults::is_dark(scene)).then_some(
-            "warning: the audit finds no light on any surface: do faces look the wrong way (their backs are black), or are lamps shut in?",
-        )
+    /// What is said where lamps light nothing at all of what was audited in a scene that has some, beside the audit of the whole solution.
+    pub fn unlit(&self, scene: &Scene, solution: &Audit) -> Option<&'static str> {
+        let is_dark =
+            self.points > 0 && self.mean_illuminance == 0.0 && self.estimated == 0.0 && !faults::is_dark(scene);
+        is_dark.then_some(match solution.mean_illuminance > 0.0 {
+            true => "warning: nothing that the picture shows receives light, though other surfaces do: does it show backs (which are black), or a room that is shut off?",
+            false => "warning: the audit finds no light on any surface: do faces look the wrong way (their backs are black), or are lamps shut in?",
+        })
     }
 
     /// Whether the solution is good enough and too little of it reached the texels or vertices.

@@ -115,7 +115,7 @@ pub(crate) struct Reading {
     pub audit: f64,
 }
 
-/// Shadow rays of a pixel in the mean, as light is found at about half of them, and what cells that are seen gather beside them
+/// Shadow rays of a pixel in the mean, as light is found at about half of them, and what is gathered beside them
 /// takes, relative to them, about.
 const PIXEL: (f64, f64) = (128.0, 2.0);
 

@@ -52,7 +52,7 @@ const TIMED_SHADOW_RAYS: u32 = 64;
 /// for them, with more places would have fewer rays.
 const SOFTENED: f64 = 0.06;
 
-/// Part of the time that cells that are seen may gather in, where it does not do for all: shadows and what is reflected are seen alike.
+/// Part of the time that what is seen may gather in, where it does not do for all: shadows and what is reflected are seen alike.
 const GATHERED: f64 = 0.5;
 
 /// Audits of what is seen relative to those of surfaces, and what an audit and the file take of the time for each second that the
@@ -69,7 +69,7 @@ pub struct View {
     pub illuminance: Vec<f32>,
     /// Places that are seen, spread over the pixels, and their irradiance there.
     pub watched: Vec<(Place, Bands)>,
-    /// Whether a deadline left fewer shadow rays than were asked for, places without any, which lie between those around them, or edges of
+    /// Whether a deadline left fewer gather rays than noise asks for, fewer shadow rays than were asked for, places without any, which lie between those around them, or edges of
     /// shadows that are as those of single places.
     pub is_hurried: bool,
 }

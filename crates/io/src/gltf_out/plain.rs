@@ -101,15 +101,17 @@ fn build(
     builder.finish()
 }
 
-/// From here on single precision does not do for places: their distance is a tenth of a millimetre.
+/// From here on single precision does not do for places, metres: its numbers lie 0.06 mm apart.
 const FAR: f64 = 1000.0;
 
-/// Where positions are written from: the scene's own origin, or where that lies far away, as of models in national coordinates, whole metres in their middle.
+/// Where positions are written from: the scene's own origin, or where that lies farther away than the scene is wide, as of models in national coordinates, whole
+/// metres in their middle.
 pub(super) fn origin(scene: &Scene) -> DVec3 {
     let bounds = |(low, high): (DVec3, DVec3), p: &DVec3| (low.min(*p), high.max(*p));
     let (low, high) = scene.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), bounds);
     let middle = (0.5 * (low + high)).round();
-    if middle.is_finite() && middle.abs().max_element() > FAR { middle } else { DVec3::ZERO }
+    let far = (high - low).max_element().max(FAR);
+    if middle.is_finite() && middle.abs().max_element() > far { middle } else { DVec3::ZERO }
 }
 
 /// An object that got no light: all its triangles as they are.

@@ -616,4 +616,7 @@ fn places_far_from_the_origin_are_kept() {
     let mut near = Scene { materials: vec![Material::default()], ..Scene::default() };
     near.add_triangles("near", 0, &[corners]);
     assert_eq!(plain::origin(&near), DVec3::ZERO);
+    // What is near is kept as it is, whatever stands far away.
+    near.add_triangles("stray", 0, &[corners.map(|corner| at + corner)]);
+    assert_eq!(plain::origin(&near), DVec3::ZERO);
 }

@@ -231,7 +231,10 @@ fn escaped(path: &str) -> String {
 
 fn limited(values: [f64; 3], most: f64, name: &str, hint: &str, place: &str, faults: &mut Faults) -> [f32; 3] {
     if values.iter().any(|v| !(0.0..=most).contains(v)) {
-        faults.warning(place, format!("{name} is {values:?}; clamped to 0..{most:e}"), hint);
+        let most = if most < 1e6 { most.to_string() } else { format!("{most:e}") };
+        let nan = if values.iter().any(|v| v.is_nan()) { ", what is no number counts as 0" } else { "" };
+        let hint = if values.iter().all(|v| *v >= 0.0) { hint } else { "write numbers from 0 on" };
+        faults.warning(place, format!("{name} is {values:?}; clamped to 0..{most}{nan}"), hint);
     }
     values.map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, most) as f32 })
 }
