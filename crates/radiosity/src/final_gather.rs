@@ -34,6 +34,10 @@ const SURFACES: usize = 2;
 const LEAST_PLACES: f64 = 10_000.0;
 const PLACE_BYTES: usize = 2000;
 
+/// How many times as wide blocks are where time does not do for these: a sixteenth of the places, at last, takes less than the field of elements that are only
+/// looked up, which is mottled.
+const WIDER: [u32; 2] = [2, 4];
+
 /// First rays of each, and the fewest where there is little time. What is smooth needs no more: it shares with hundreds.
 const FIRST: usize = 32;
 const FEWEST: usize = 16;
@@ -116,7 +120,7 @@ pub(crate) fn indirect(
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Bands>, bool), Error> {
     let solution = &baked.solution;
-    let blocks = Blocks::new(solution, view, stations);
+    let mut blocks = Blocks::new(solution, view, stations, 1);
     // Within a time limit the field has its part of the time: by what it alone shows, or half where it is shown everywhere.
     let curved = blocks.gathers.iter().filter(|gathers| !**gathers).count() as f64 / stations.len().max(1) as f64;
     let part = if solution.options.looked_up { 1.0 - curved } else { 0.5 };
@@ -124,8 +128,16 @@ pub(crate) fn indirect(
         Some(left) => Timed::new(monitor, Duration::from_secs_f64(part * left)),
         None => Timed::unlimited(monitor),
     };
-    let gathered = blocks.gathered(baked, stations, &own)?;
+    let mut gathered = blocks.gathered(baked, stations, false, &own)?;
     let is_whole = gathered.as_ref().map_or(blocks.blocks.is_empty(), |gathered| gathered.is_whole);
+    for wider in WIDER {
+        if gathered.is_some() || blocks.blocks.is_empty() {
+            break;
+        }
+        blocks = Blocks::new(solution, view, stations, wider);
+        let is_least = solution.options.looked_up && wider == WIDER[WIDER.len() - 1];
+        gathered = blocks.gathered(baked, stations, is_least, &own)?;
+    }
     // Elements that are only looked up make no field that is worth a look.
     let is_shown = |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.gathers[place]);
     let mut looks = vec![0; solution.elements.cells()];
@@ -161,12 +173,12 @@ fn is_flat(solution: &Solution, Station { place, side, .. }: &Station) -> bool {
 }
 
 impl<'a> Blocks<'a> {
-    fn new(solution: &Solution, view: &'a ViewRays, stations: &[Station]) -> Blocks<'a> {
+    fn new(solution: &Solution, view: &'a ViewRays, stations: &[Station], wider: u32) -> Blocks<'a> {
         let gathers = |station: &Station| solution.options.form_factors.is_none() && is_flat(solution, station);
         let mut gathers: Vec<bool> = stations.par_iter().map(gathers).collect();
         let count = gathers.iter().filter(|gathers| **gathers).count() as f64;
         let most = PLACES.min((solution.memory_allowed() / PLACE_BYTES) as f64).max(LEAST_PLACES);
-        let side = (count / most).sqrt().ceil().max(1.0) as u32;
+        let side = wider * (count / most).sqrt().ceil().max(1.0) as u32;
         let first = |row: u32| view.seen.partition_point(|seen| seen.pixel < row * view.width) as u32;
         let of_row = |row: u32| {
             let places = (first(row * side)..first((row + 1) * side)).filter(|place| gathers[*place as usize]);
@@ -228,8 +240,14 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// Light that the chosen places gather; nothing where time does not do for the fewest rays.
-    fn gathered(&self, baked: &Baked, stations: &[Station], monitor: &dyn Monitor) -> Result<Option<Gathered>, Error> {
+    /// Light that the chosen places gather; nothing where time does not do for the fewest rays, unless this `is_least` that is done.
+    fn gathered(
+        &self,
+        baked: &Baked,
+        stations: &[Station],
+        is_least: bool,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Gathered>, Error> {
         let solution = &baked.solution;
         let at: Vec<Station> = self.blocks.iter().map(|block| stations[block.chosen as usize]).collect();
         if at.is_empty() {
@@ -240,7 +258,7 @@ impl<'a> Blocks<'a> {
         let mut first = FIRST;
         if let Some(left) = pace::left(monitor) {
             let cost = cost(solution, &places, monitor)?;
-            if !pace::suffices(left, cost.seconds(FEWEST as f64)) {
+            if !is_least && !pace::suffices(left, cost.seconds(FEWEST as f64)) {
                 return Ok(None);
             }
             first = cost.rays(left, [FEWEST, FIRST].map(|rays| rays as f64)) as usize;
