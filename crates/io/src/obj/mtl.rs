@@ -294,6 +294,22 @@ mod tests {
         }
     }
 
+    /// What is wrong with numbers out of range, and what to write, by how they are out of it.
+    #[test]
+    fn numbers_out_of_range_are_told_as_they_are_taken() {
+        for (values, most, taken, told, hint) in [
+            ([2.0, 0.5, 0.5], 1.0, [1.0, 0.5, 0.5], "clamped to 0..1 ", "no more"),
+            ([-1.0, 0.5, 0.5], 1.0, [0.0, 0.5, 0.5], "clamped to 0..1 ", "from 0 on"),
+            ([f64::NAN, 0.5, 0.5], 1.0, [0.0, 0.5, 0.5], "0..1, what is no number counts as 0", "from 0 on"),
+            ([1e30, 1.0, 1.0], 1e12, [1e12, 1.0, 1.0], "0..1e12", "no more"),
+        ] {
+            let mut faults = Faults::default();
+            assert_eq!(limited(values, most, "Kd", "no more", "a.mtl:2", &mut faults), taken);
+            let text = format!("{} ", faults.to_string().replace('\n', " "));
+            assert!(text.contains(told) && text.contains(hint), "{text}");
+        }
+    }
+
     /// They were passed over in silence.
     #[test]
     fn light_that_would_pass_is_told() {
