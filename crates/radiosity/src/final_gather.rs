@@ -75,8 +75,7 @@ const FARTHER: usize = 4;
 /// a fifth farther off, with 1.7 a room with a bright gap had dark stains.
 const SURE: f32 = 4.0;
 
-/// Weight of a place whose block is not the pixel's own and whose tent ends before it, beside 1 at its pixel: of a block's one place something is
-/// always there.
+/// Least weight of a block's own place, where its tent ends before a pixel of the block: something is always there.
 const LEAST_WEIGHT: f32 = 1e-3;
 
 /// A surface within a square of some pixels: the places that it shows there, and the one that gathers for them.
@@ -94,6 +93,24 @@ struct Gathered {
     halves: Vec<[Bands; 2]>,
     /// Whether there was time for all rays.
     is_whole: bool,
+}
+
+/// Noise that is asked of blocks.
+struct Wanted {
+    /// Root mean square by the weights, lx.
+    noise: f64,
+    /// By block.
+    weights: Vec<f64>,
+    /// Most of each, lx.
+    ceilings: Vec<f64>,
+}
+
+impl Wanted {
+    /// Root mean square of so much noise of each, lx.
+    fn of(&self, noise: &[f32]) -> f64 {
+        let squares = noise.iter().zip(&self.weights).map(|(noise, weight)| weight * f64::from(*noise).powi(2));
+        (squares.sum::<f64>() / self.weights.iter().sum::<f64>()).sqrt()
+    }
 }
 
 /// What of a picture gathers, and the rest.
@@ -164,7 +181,7 @@ pub(crate) fn indirect(
     Ok((light, is_whole))
 }
 
-/// Whether a triangle receives with its own normal all over.
+/// Whether the triangle of a station receives with its own normal all over.
 fn is_flat(solution: &Solution, Station { place, side, .. }: &Station) -> bool {
     let (tracer, triangle) = (solution.tracer(), place.triangle as usize);
     let own = tracer.mesh.normal(triangle) * if *side == Side::Front { 1.0 } else { -1.0 };
@@ -254,7 +271,6 @@ impl<'a> Blocks<'a> {
             return Ok(None);
         }
         let places: Vec<Place> = at.iter().map(|station| station.place).collect();
-        let pixels: Vec<f64> = self.blocks.iter().map(|block| block.places.len() as f64).collect();
         let mut first = FIRST;
         if let Some(left) = pace::left(monitor) {
             let cost = cost(solution, &places, monitor)?;
@@ -283,40 +299,27 @@ impl<'a> Blocks<'a> {
         // Those of places around together tell the noise, bright paths and all; what is evened out by light takes part of these for detail.
         let mut halves: Vec<[Bands; 2]> = first_halves.iter().map(|half| half.light).collect();
         let mut pooled = share(&found, &halves);
-        // Noise counts as the audit has it and as the eye does, relative to what light there is.
-        let direct = |place: &Place| solution.element_at(place).map_or([0.0; 3], |e| solution.columns.mean(e as usize));
-        let all = |(place, pooled): (&Place, &Pooled)| f64::from(luminance(direct(place)) + luminance(pooled.light));
-        let size: Vec<f64> = places.iter().zip(&pooled).map(all).collect();
-        let count: f64 = pixels.iter().sum();
-        let mean_of = |of: &dyn Fn(f64) -> f64| size.iter().zip(&pixels).map(|(e, n)| n * of(*e)).sum::<f64>() / count;
-        let (average, square) = (mean_of(&|e| e), mean_of(&|e| e * e));
-        let counted: Vec<f64> = size.iter().map(|e| e.max(DARK * average)).collect();
-        let weight = |(e, n): (&f64, &f64)| 0.5 * n * (1.0 / square + 1.0 / (e * (e + average)));
-        let weights: Vec<f64> = counted.iter().zip(&pixels).map(weight).collect();
-        let asked = (NOISE * baked.error).min(MOST_NOISE);
-        let target = asked * (count / weights.iter().sum::<f64>()).sqrt();
-        let ceilings: Vec<f64> = counted.iter().map(|e| VISIBLE * asked * e).collect();
-        // Once the noisiest have had their share, what counts is the noise of all.
+        let wanted = self.wanted(baked, &places, &pooled);
         let none = vec![f64::INFINITY; at.len()];
         let mut is_whole = first == FIRST;
         for step in 1..=STEPS {
             // Two halves alone say little of a place that shares with none.
             let noise = |(pooled, noise): (&Pooled, &f32)| if pooled.own < 1.0 { pooled.spread } else { *noise };
             let spread: Vec<f32> = pooled.iter().zip(&found.noise).map(noise).collect();
-            let squares = spread.iter().zip(&weights).map(|(spread, weight)| weight * f64::from(*spread).powi(2));
-            if step > 1 && (squares.sum::<f64>() / count).sqrt() <= ENOUGH * asked {
+            if step > 1 && wanted.of(&spread) <= ENOUGH * wanted.noise {
                 break;
             }
-            let ceilings = if step == 1 { &ceilings } else { &none };
-            let mut times = growth(&spread, &weights, ceilings, target, GATHERED_POWER);
+            // Once the noisiest have had their share, what counts is the noise of all.
+            let ceilings = if step == 1 { &wanted.ceilings } else { &none };
+            let mut times = growth(&spread, &wanted.weights, ceilings, wanted.noise, GATHERED_POWER);
             curb(&mut times, None);
             let had = found.rays.iter().map(|rays| f64::from(*rays)).sum::<f64>() / at.len() as f64;
             let mut most = MOST / had;
             if let Some(left) = pace::left(monitor) {
-                let wanted = (times.iter().sum::<f64>() / times.len() as f64).min(most);
+                let all = (times.iter().sum::<f64>() / times.len() as f64).min(most);
                 // Rays are doubled or not, so that they may become √2 times as many as is said.
                 most = most.min((1.0 + pace::affordable(left, each) as f64 / had) * FRAC_1_SQRT_2);
-                is_whole &= wanted <= most;
+                is_whole &= all <= most;
             }
             if most < WORTH {
                 break;
@@ -342,6 +345,27 @@ impl<'a> Blocks<'a> {
         // What paths find beyond what they look up may be less than nothing.
         let light = pooled.into_iter().map(|p| p.light.map(|e| e.max(0.0))).collect();
         Ok(Some(Gathered { light, halves, is_whole }))
+    }
+
+    /// What noise is asked of `places`, one for each block, by what they found so far: it counts as the audit has it and as the eye does, relative to what light there is.
+    fn wanted(&self, baked: &Baked, places: &[Place], pooled: &[Pooled]) -> Wanted {
+        let solution = &baked.solution;
+        let direct = |place: &Place| solution.element_at(place).map_or([0.0; 3], |e| solution.columns.mean(e as usize));
+        let all = |(place, pooled): (&Place, &Pooled)| f64::from(luminance(direct(place)) + luminance(pooled.light));
+        let size: Vec<f64> = places.iter().zip(pooled).map(all).collect();
+        let pixels: Vec<f64> = self.blocks.iter().map(|block| block.places.len() as f64).collect();
+        let count: f64 = pixels.iter().sum();
+        let mean_of = |of: &dyn Fn(f64) -> f64| size.iter().zip(&pixels).map(|(e, n)| n * of(*e)).sum::<f64>() / count;
+        let (average, square) = (mean_of(&|e| e), mean_of(&|e| e * e));
+        let counted: Vec<f64> = size.iter().map(|e| e.max(DARK * average)).collect();
+        let weight = |(e, n): (&f64, &f64)| 0.5 * n * (1.0 / square + 1.0 / (e * (e + average)));
+        let weights: Vec<f64> = counted.iter().zip(&pixels).map(weight).collect();
+        let asked = (NOISE * baked.error).min(MOST_NOISE);
+        Wanted {
+            noise: asked * (count / weights.iter().sum::<f64>()).sqrt(),
+            ceilings: counted.iter().map(|e| VISIBLE * asked * e).collect(),
+            weights,
+        }
     }
 
     /// Adds to the light of all places of the blocks what lies between what chosen ones have `beyond` it, on the same surface in these and in those

@@ -69,8 +69,8 @@ pub struct View {
     pub illuminance: Vec<f32>,
     /// Places that are seen, spread over the pixels, and their irradiance there.
     pub watched: Vec<(Place, Bands)>,
-    /// Whether a deadline left fewer gather rays than noise asks for, fewer shadow rays than were asked for, places without any, which lie between those around them, or edges of
-    /// shadows that are as those of single places.
+    /// Whether a deadline left fewer gather rays than noise asks for, fewer shadow rays than were asked for, places without any, which
+    /// lie between those around them, or edges of shadows that are as those of single places.
     pub is_hurried: bool,
 }
 
@@ -87,9 +87,10 @@ impl View {
     }
 }
 
-/// Looks at a solution. Places that are seen gather their indirect light, as do cells of surfaces that are not flat, until its noise is well below
-/// the error that the solution was made for, as far as some hundreds or thousands of rays bring it. Within a deadline that leaves too little for this, these gather and pixels are
-/// lit with fewer rays, for which a part of them is timed; time for the audit is left.
+/// Looks at a solution. Places that are seen gather their indirect light, as do cells of surfaces that are not flat, until its noise is
+/// well below the error that the solution was made for, as far as some hundreds or thousands of rays bring it. Within a deadline that
+/// leaves too little for this, these gather and pixels are lit with fewer rays, for which a part of them is timed; time for the audit
+/// is left.
 ///
 /// # Errors
 /// [`Error::Stopped`].
