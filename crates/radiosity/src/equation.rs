@@ -6,6 +6,7 @@
 use crate::Error;
 use crate::displayed::{Displayed, Screen};
 use crate::monitor::{Monitor, is_over};
+use crate::solution::FEW;
 use radiosity_scene::{Bands, Elements, Enclosure, Mesh};
 use radiosity_solve::{
     Go, Info, Params, SheetResponse, SolveError, Solver, SparseTransport, Transport, solve as solve_stored,
@@ -134,10 +135,9 @@ pub const TABLE_TOLERANCE: f64 = 1e-6;
 /// Work between two looks at what is displayed, applications of F: a look costs about as much as a tenth of one.
 const LOOK: f64 = 0.5;
 
-/// Sweeps, and seconds, that there are whether or not there is time, where one is a step: some milliseconds each, and without them
-/// there is no reflected light. In so many seconds a room is solved.
-const FIRST_SWEEPS: f64 = 4.0;
-const FIRST_SECONDS: f64 = 0.1;
+/// Sweeps that are made whether or not there is time, where one is a step: of [`FEW`] elements, of which one takes some milliseconds
+/// and so many solve a room, and of more, which without some had no reflected light.
+const FIRST_SWEEPS: [f64; 2] = [32.0, 4.0];
 
 /// How to solve, and when an iterate will do.
 pub(crate) struct Task<'a> {
@@ -159,7 +159,7 @@ pub(crate) fn solve(
     let solver = task.solver;
     let mut way = Way::new(solver.is_random(), task.params.tolerance, &response.diffuse.reflectance);
     let (mut looked, mut reached) = (f64::NEG_INFINITY, f64::INFINITY);
-    let begun = Instant::now();
+    let first_sweeps = FIRST_SWEEPS[usize::from(x.len() > 3 * FEW)];
     let step = |x: &[f64], info: &Info| {
         if !monitor.step(way.done(info), PARTS) {
             return Go::Stop;
@@ -174,8 +174,7 @@ pub(crate) fn solve(
                 x.len() / 3
             ));
         }
-        let is_begun = info.work >= FIRST_SWEEPS && begun.elapsed().as_secs_f64() >= FIRST_SECONDS;
-        if is_over(monitor) && (is_begun || !solver.applies_only()) {
+        if is_over(monitor) && (info.work >= first_sweeps || !solver.applies_only()) {
             return Go::Enough;
         }
         if let Some((screen, asked)) = task.displayed {

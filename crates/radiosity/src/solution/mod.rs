@@ -32,7 +32,7 @@ const SOLVED: f64 = 0.2;
 
 /// So many elements get their direct light and their first rays whether or not there is time: a few seconds. A building of a
 /// million triangles took 102 s where 60 were allowed.
-const FEW: usize = 100_000;
+pub(crate) const FEW: usize = 100_000;
 
 /// A solved scene.
 pub struct Solution<'a> {
