@@ -119,6 +119,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         .then(|| views::camera(&input.scene, &tracer, &arguments.picture, &arguments.scene, progress))
         .transpose()?;
 
+    let eyes = views::eyes(&input.scene, &tracer, camera.as_ref());
+    let tracer = tracer.seen_from(&eyes);
     progress.parts();
     arguments.solve.warn_of_methods(progress);
     progress.limit(arguments.solve.time);

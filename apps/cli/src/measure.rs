@@ -89,6 +89,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.spare(&input.files)?;
     arguments.solve.refuse_tiny_elements(&input.mesh)?;
     let tracer = Tracer::new(&input.scene, &input.mesh);
+    let eyes: Vec<_> = points.iter().map(|p| p.position + tracer.reach() * p.normal).collect();
+    let tracer = tracer.seen_from(&eyes);
     let places: Vec<_> = points.iter().map(|p| (p.position, p.normal)).collect();
     progress.parts();
     if let Some(warning) = strays(&input.scene, &places) {

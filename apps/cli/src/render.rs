@@ -38,6 +38,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let tracer = Tracer::new(&input.scene, &input.mesh);
     arguments.picture.warn_of_what_has_no_effect(true, !views::is_exr(&arguments.output), progress);
     let camera = views::camera(&input.scene, &tracer, &arguments.picture, &arguments.scene, progress)?;
+    let tracer = tracer.seen_from(&[camera.position()]);
     progress.parts();
     arguments.solve.warn_of_methods(progress);
     progress.limit(arguments.solve.time);

@@ -139,13 +139,23 @@ pub fn camera(
     Ok(camera)
 }
 
+/// Where light that is written will be looked at from, as far as that is known: the scene's cameras and the one that is chosen, else
+/// where one would be placed.
+pub fn eyes(scene: &Scene, tracer: &Tracer, chosen: Option<&Camera>) -> Vec<DVec3> {
+    let mut eyes: Vec<DVec3> = scene.cameras.iter().chain(chosen).map(Camera::position).collect();
+    if eyes.is_empty() {
+        eyes.push(radiosity::place_camera(tracer, None).position());
+    }
+    eyes
+}
+
 /// The options that put a camera where one is, to a tenth of a per mille of the scene's size.
 fn in_words(camera: &Camera, scene: &Scene, size: Option<(u32, u32)>) -> String {
     let extent = scene.bounding_box().map_or(0.0, |[low, high]| (high - low).max_element());
     let extent = if extent > 0.0 { extent } else { 1.0 };
     let decimals = (4.0 - extent.log10()).ceil().clamp(0.0, 20.0) as usize;
     let words = |p: DVec3| p.to_array().map(|x| numbers::fixed(x, decimals)).join(",");
-    let eye = camera.world_from_camera.w_axis.truncate();
+    let eye = camera.position();
     let target = eye - extent * camera.world_from_camera.z_axis.truncate();
     let (width, height) = picture_size(camera, size);
     let fov = match camera.projection {

@@ -229,16 +229,12 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         monitor.note(&rounds[rounds.len() - 1].to_string());
         let achieved = audit.upper <= options.error;
         // More rounds only while there is something to gain, and memory and leave to gain it with.
-        let smaller = solution.element_size / std::f64::consts::SQRT_2;
         let noisy = !usual.looked_up && solution.field_noise(&received) > 0.5 * options.error;
         let is_given = options.solve.element_size.is_some();
         let next = match first.take() {
             Some(_) => usual,
-            None => SolveOptions {
-                rays: if noisy { 2 * solution.rays() } else { solution.rays() },
-                element_size: Some(if noisy { solution.element_size } else { smaller }),
-                ..usual
-            },
+            None if noisy => SolveOptions { rays: 2 * solution.rays(), ..solution.options },
+            None => SolveOptions { rays: solution.rays(), cells: 2 * solution.options.cells, ..usual },
         };
         let fits = Solution::fits(tracer, &next);
         let is_last = achieved || rounds.len() >= most_rounds || !fits || (is_given && !noisy) || is_stalled(&rounds);

@@ -369,7 +369,7 @@ pub(crate) fn thinned(rays: usize, part: f64) -> usize {
 
 /// Root mean square illuminance over the exposed surfaces, lx: what relative errors are relative to.
 pub(crate) fn root_mean_square(solution: &Solution) -> f64 {
-    let weight = solution.exposed_area();
+    let weight = solution.counted_area();
     let square = |(h, w): (&Bands, &f64)| w * f64::from(luminance(*h)).powi(2);
     let sum: f64 = solution.irradiance().iter().zip(&weight).map(square).sum();
     (sum / weight.iter().sum::<f64>().max(f64::MIN_POSITIVE)).sqrt()

@@ -1,5 +1,6 @@
 //! How far surfaces see: the scale of a scene's rooms, whatever its size, and how many cells it takes.
 
+use crate::solution::scaled_area;
 use crate::{Solution, SolveOptions};
 use glam::DVec2;
 use radiosity_scene::Side;
@@ -22,7 +23,7 @@ impl SolveOptions {
     /// holds. As many for all rooms together as one of them has would leave each a few.
     pub(crate) fn cells_on_path(&mut self, tracer: &Tracer, count: f64) {
         let size = mean_path(tracer) / count;
-        let mut wanted = ((2.0 * tracer.mesh.whole_area() / (size * size)) as usize).min(MOST_CELLS);
+        let mut wanted = ((2.0 * scaled_area(tracer) / (size * size)) as usize).min(MOST_CELLS);
         while wanted > self.cells && Solution::memory(tracer, &SolveOptions { cells: wanted, ..*self }) > self.memory {
             wanted /= 2;
         }
@@ -31,12 +32,14 @@ impl SolveOptions {
 }
 
 /// Mean distance from a place on a surface to what it sees, metres: 4 V/A in an empty room of volume V and area A (the mean
-/// chord). Rays that leave the scene, and those within solids, do not count; infinite where there are no others.
+/// chord). Rays that leave the scene, and those within solids, do not count; infinite where there are no others. Where scales differ
+/// distances are those of the widest place: relative to the scale of the place.
 fn mean_path(tracer: &Tracer) -> f64 {
-    let mesh = tracer.mesh;
+    let (mesh, scales) = (tracer.mesh, tracer.scales());
+    let scale = |triangle: usize| scales.get(triangle).map_or(1.0, |scale| f64::from(*scale));
     let below: Vec<f64> = (0..mesh.triangles.len())
         .scan(0.0, |sum, triangle| {
-            *sum += mesh.area(triangle);
+            *sum += mesh.area(triangle) / scale(triangle).powi(2);
             Some(*sum)
         })
         .collect();
@@ -48,14 +51,14 @@ fn mean_path(tracer: &Tracer) -> f64 {
             let [u, v, x, y] = sequence.point(index).map(f64::from);
             let wanted = (f64::from(index) + f64::from(unit(hash(index)))) / f64::from(RAYS) * total;
             let triangle = below.partition_point(|sum| *sum <= wanted).min(below.len() - 1);
-            let (x, y) = triangle_from_square(x, y);
+            let (scale, (x, y)) = (scale(triangle), triangle_from_square(x, y));
             let normal = mesh.normal(triangle);
             let place = Place { point: mesh.point(triangle, DVec2::new(x, y)), normal, triangle: triangle as u32 };
             let ray = tracer.ray(&place, cosine_direction(&frame(normal), u, v), f64::INFINITY);
             match tracer.first(&ray, hash(index)) {
                 Found::Surface { triangle, side, distance, .. } => {
                     let material = tracer.scene.material(mesh.source[triangle as usize] as usize);
-                    (side == Side::Front || material.has_two_sides()).then_some(f64::from(distance))
+                    (side == Side::Front || material.has_two_sides()).then_some(f64::from(distance) / scale)
                 }
                 _ => None,
             }

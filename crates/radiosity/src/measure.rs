@@ -254,8 +254,6 @@ pub fn measure(
     let mut solving = Instant::now();
     let mut solution = Solution::new(tracer, &solve, monitor)?;
     let mut solution_takes = solving.elapsed().as_secs_f64();
-    // Every further one is told how large its elements are.
-    solve.element_size = Some(solution.element_size);
 
     // The referee looks at every n-th point.
     let stride = places.len().div_ceil(options.audit_points.max(1)).max(1);
@@ -369,7 +367,7 @@ fn solved_again<'t>(
     tracer: &'t Tracer<'t>,
     monitor: &dyn Monitor,
 ) -> Result<Option<Solution<'t>>, Error> {
-    let again = if next.element_size == before.element_size {
+    let again = if next.cells == before.cells {
         solution.refine(next.rays, monitor).map(|()| solution)
     } else {
         drop(solution);
@@ -414,7 +412,7 @@ impl Plan {
 fn finer(solve: &SolveOptions, rays: usize, alone: bool, least_variation: f64) -> SolveOptions {
     let mut next = SolveOptions { rays: 2 * rays, ..*solve };
     if !alone {
-        next.element_size = solve.element_size.map(|size| size / std::f64::consts::SQRT_2);
+        next.cells *= 2;
         next.shadowing.places *= 2;
         next.variation = solve.variation.min((0.5 * solve.variation).max(least_variation));
     }

@@ -11,7 +11,7 @@
 
 use crate::division::Optics;
 use crate::monitor::{Monitor, Watch};
-use crate::solution::element_size;
+use crate::solution::cell_width;
 use crate::{Error, Solution, SolveOptions};
 use glam::DVec3;
 use radiosity_scene::{Bands, Camera, Elements};
@@ -56,7 +56,7 @@ impl Glimpse {
             return Err(Error::Empty("the scene has no surface"));
         }
         let options = coarse(options);
-        let elements = Elements::new(scene, mesh, element_size(tracer, &options));
+        let elements = Elements::new(scene, mesh, cell_width(tracer, &options));
         let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
 

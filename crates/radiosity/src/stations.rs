@@ -9,10 +9,10 @@ use radiosity_trace::{Found, Place, Tracer};
 use radiosity_transport::exposure::{is_buried, open_place};
 use radiosity_view::picture::shading_normal;
 
-/// `count` stations spread evenly over the exposed area, one in each of as many equal shares of it, less those that turn
+/// `count` stations spread evenly over the exposed area as it counts, one in each of as many equal shares of it, less those that turn
 /// out to lie inside a solid. They receive with the shading normal, as pictures and lightmaps do.
 pub fn spread(solution: &Solution, count: usize, seed: u32) -> Vec<Station> {
-    let weight = solution.exposed_area();
+    let weight = solution.counted_area();
     let total: f64 = weight.iter().sum();
     let mut stations = Vec::with_capacity(count);
     let (mut element, mut below) = (0usize, 0.0);

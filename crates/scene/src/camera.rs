@@ -45,10 +45,15 @@ impl Camera {
         }
     }
 
+    /// Where the eye is; of a parallel projection the middle of the picture.
+    pub fn position(&self) -> DVec3 {
+        self.world_from_camera.w_axis.truncate()
+    }
+
     /// Origin and unit direction of the ray through picture coordinates `x`, `y` in −1..1 (x right, y up) at the
     /// given aspect (width over height).
     pub fn ray(&self, x: f64, y: f64, aspect: f64) -> (DVec3, DVec3) {
-        let eye = self.world_from_camera.w_axis.truncate();
+        let eye = self.position();
         match self.projection {
             Projection::Perspective { vertical_fov } => {
                 let tangent = (0.5 * vertical_fov).tan();

@@ -23,6 +23,28 @@ const MAX_DIVISION: u32 = 64;
 /// divisions go up by twos.
 const SMALLEST_CELL: f64 = 0.125;
 
+/// How wide cells are to be.
+#[derive(Clone, Copy, Debug)]
+pub struct CellWidth<'a> {
+    /// Metres, where scales are 1.
+    pub size: f64,
+    /// Width on each triangle relative to that; empty where it is the same on all.
+    pub scales: &'a [f32],
+}
+
+impl From<f64> for CellWidth<'_> {
+    fn from(size: f64) -> Self {
+        CellWidth { size, scales: &[] }
+    }
+}
+
+impl CellWidth<'_> {
+    /// Width of cells of a triangle, metres.
+    pub fn on(&self, triangle: usize) -> f64 {
+        self.size * self.scales.get(triangle).map_or(1.0, |scale| f64::from(*scale))
+    }
+}
+
 /// The elements of a mesh.
 #[derive(Clone, Debug, Default)]
 pub struct Elements {
@@ -36,16 +58,17 @@ pub struct Elements {
     first: Vec<ElementId>,
     /// Cell of each element.
     cell: Vec<u32>,
-    /// Area from which on a cell counts as a whole one, m²; zero where all do.
-    whole: f64,
+    /// Area from which on a cell counts as a whole one, m², one for all or one for each triangle; empty where all count.
+    whole: Vec<f64>,
 }
 
 impl Elements {
-    /// Divides every triangle into cells about `size` metres wide, of one element each.
-    pub fn new(scene: &Scene, mesh: &Mesh, size: f64) -> Elements {
+    /// Divides every triangle into cells about as wide, of one element each.
+    pub fn new<'a>(scene: &Scene, mesh: &Mesh, width: impl Into<CellWidth<'a>>) -> Elements {
+        let width = width.into();
         let mut elements = Elements::default();
         for t in 0..mesh.triangles.len() {
-            let division = division(mesh, t, size);
+            let division = division(mesh, t, &width);
             let mut run = || {
                 let base = elements.triangle.len() as u32;
                 elements.triangle.extend(std::iter::repeat_n(t as u32, (division * division) as usize));
@@ -77,23 +100,30 @@ impl Elements {
         Elements { first, cell, ..self.clone() }
     }
 
-    /// The same elements, where triangles too small to be cut into cells of `size` count by their area: for light that is
+    /// The same elements, where triangles too small to be cut into cells so wide count by their area: for light that is
     /// only looked up, so that the noise of many small ones averages out.
-    pub fn shared(self, size: f64) -> Elements {
-        Elements { whole: SMALLEST_CELL * size * size, ..self }
+    pub fn shared(self, width: &CellWidth) -> Elements {
+        let whole = |t: usize| SMALLEST_CELL * width.on(t) * width.on(t);
+        Elements { whole: (0..width.scales.len().max(1)).map(whole).collect(), ..self }
     }
 
     /// Share of the rays of a cell that an element gets: all, or as many as the pieces of a divided cell leave it, or what
     /// its area tells ([`Elements::shared`]).
     pub fn share(&self, mesh: &Mesh, element: ElementId) -> f64 {
         let even = 1.0 / f64::from(self.pieces(element));
-        if self.whole > 0.0 { even.min(self.area(mesh, element) / self.whole) } else { even }
+        let whole = match self.whole.as_slice() {
+            [] => return even,
+            [whole] => whole,
+            each => &each[self.place(element).0],
+        };
+        even.min(self.area(mesh, element) / whole)
     }
 
-    /// How many elements a size would give, without making them.
-    pub fn count(scene: &Scene, mesh: &Mesh, size: f64) -> usize {
+    /// How many elements a width would give, without making them.
+    pub fn count<'a>(scene: &Scene, mesh: &Mesh, width: impl Into<CellWidth<'a>>) -> usize {
+        let width = width.into();
         let sides = |t: usize| 1 + usize::from(scene.material(mesh.source[t] as usize).has_two_sides());
-        (0..mesh.triangles.len()).map(|t| (division(mesh, t, size) as usize).pow(2) * sides(t)).sum()
+        (0..mesh.triangles.len()).map(|t| (division(mesh, t, &width) as usize).pow(2) * sides(t)).sum()
     }
 
     /// Number of elements.
@@ -325,8 +355,8 @@ pub fn triangle_from_square(x: f64, y: f64) -> (f64, f64) {
 
 /// Cells along an edge: the geometric mean of the longest edge and √(2 area) over the size, so that squares come
 /// out as asked and slivers do not explode; the next power of two, because powers of two nest along shared edges.
-fn division(mesh: &Mesh, triangle: usize, size: f64) -> u32 {
-    division_of(mesh.corners(triangle), size)
+fn division(mesh: &Mesh, triangle: usize, width: &CellWidth) -> u32 {
+    division_of(mesh.corners(triangle), width.on(triangle))
 }
 
 /// Cells along an edge of a triangle that is cut into cells about `size` wide: a power of two.

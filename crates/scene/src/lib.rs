@@ -23,7 +23,7 @@ pub mod texture;
 pub use camera::{Camera, Projection};
 pub use curve::Curve;
 pub use element_facets::ElementError;
-pub use elements::{ElementId, Elements};
+pub use elements::{CellWidth, ElementId, Elements};
 pub use facet::{Enclosure, EnclosureSurface, Facet, FacetError};
 pub use fault::{Fault, Faults, Severity, counted, size};
 pub use light::{PointLight, PointLightKind};

@@ -10,6 +10,7 @@ pub mod brute;
 mod build;
 mod collapse;
 pub mod emitters;
+mod importance;
 mod intersect;
 #[cfg(target_arch = "aarch64")]
 mod neon;

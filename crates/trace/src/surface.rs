@@ -101,6 +101,8 @@ pub struct Tracer<'a> {
     /// Per triangle, the weight above which no hit is at an edge.
     edge: Vec<f32>,
     all_opaque: bool,
+    /// How wide cells are to be.
+    scales: Vec<f32>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -211,12 +213,29 @@ impl<'a> Tracer<'a> {
             kind,
             normals: (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t).as_vec3()).collect(),
             edge: (0..mesh.triangles.len()).into_par_iter().map(|t| edge_weight(mesh.corners(t), offset)).collect(),
+            scales: Vec::new(),
         }
+    }
+
+    /// The same for light that is looked at from some places: what is more important to them than its area tells is cut into smaller
+    /// elements. Without it a room on a wide site has a few, whatever is asked.
+    pub fn seen_from(mut self, eyes: &[DVec3]) -> Tracer<'a> {
+        self.scales = crate::importance::scales(&self, eyes);
+        self
+    }
+
+    /// For each triangle how wide its cells are to be, relative to those of most of the scene and at most 1; empty where all are as wide.
+    pub fn scales(&self) -> &[f32] {
+        &self.scales
     }
 
     /// Memory that it takes beside the scene and the mesh, bytes.
     pub fn bytes(&self) -> usize {
-        self.tree.memory() + size_of_val(&*self.kind) + size_of_val(&*self.normals) + size_of_val(&*self.edge)
+        self.tree.memory()
+            + size_of_val(&*self.kind)
+            + size_of_val(&*self.normals)
+            + size_of_val(&*self.edge)
+            + size_of_val(&*self.scales)
     }
 
     /// The tree of boxes (its coordinates are relative to the scene's centre).

@@ -8,7 +8,7 @@ mod options;
 
 pub use balance::Balance;
 pub use options::SolveOptions;
-pub(crate) use options::element_size;
+pub(crate) use options::{cell_width, scaled_area};
 
 use crate::Error;
 use crate::displayed::{Screen, Shown};
@@ -102,11 +102,11 @@ impl<'a> Solution<'a> {
         options.refuse_unfit_solver(scene)?;
         options.refuse_beyond_single_precision()?;
         let stages = Stages::default();
-        let element_size = element_size(tracer, options);
-        options.refuse_large_matrices(Elements::count(scene, mesh, element_size))?;
+        let width = cell_width(tracer, options);
+        options.refuse_large_matrices(Elements::count(scene, mesh, width))?;
         let needed = Solution::memory(tracer, options);
         if needed > options.memory {
-            return Err(memory_error(tracer, Elements::count(scene, mesh, element_size), needed, options));
+            return Err(memory_error(tracer, Elements::count(scene, mesh, width), needed, options));
         }
         let lights = Luminaires::most(scene);
         let needed = |elements: usize, cells: usize| {
@@ -114,8 +114,8 @@ impl<'a> Solution<'a> {
         };
         let begin = |elements: usize| Begin { monitor, is_soon: elements <= FEW };
         let elements = stages.time(monitor, "elements", || {
-            let cells = Elements::new(scene, mesh, element_size);
-            let cells = if options.looked_up { cells.shared(element_size) } else { cells };
+            let cells = Elements::new(scene, mesh, width);
+            let cells = if options.looked_up { cells.shared(&width) } else { cells };
             // Coarser light, where there is no room or time for finer.
             let (whole, of_piece) = (needed(cells.len(), cells.cells()), needed(1, 0) - needed(0, 0));
             let in_memory = cells.len() + options.memory.saturating_sub(whole) / of_piece;
@@ -172,7 +172,7 @@ impl<'a> Solution<'a> {
             exitance,
             info: Info::default(),
             stages,
-            element_size,
+            element_size: width.size,
             sky,
             table,
             is_cut: false,
@@ -239,7 +239,7 @@ impl<'a> Solution<'a> {
     /// Bytes that the scene, its mesh and tree and a solution with these options take, as far as that is known before the
     /// elements are made: none of them divided. Rays may lie in a file and do not count.
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
-        let cells = Elements::count(tracer.scene, tracer.mesh, element_size(tracer, options));
+        let cells = Elements::count(tracer.scene, tracer.mesh, cell_width(tracer, options));
         let solution = footprint::solution(tracer, cells, Luminaires::most(tracer.scene));
         solution.saturating_add(options.stored(cells, cells))
     }
@@ -247,7 +247,7 @@ impl<'a> Solution<'a> {
     /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
     pub(crate) fn fits(tracer: &Tracer, options: &SolveOptions) -> bool {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
-        let elements = Elements::count(scene, mesh, element_size(tracer, options));
+        let elements = Elements::count(scene, mesh, cell_width(tracer, options));
         Solution::memory(tracer, options) <= options.memory && options.solver.matrix_bytes(elements) <= options.memory
     }
 
@@ -502,6 +502,18 @@ impl<'a> Solution<'a> {
     /// Exposed area of each element, m²; zero where it is buried.
     pub fn exposed_area(&self) -> Vec<f64> {
         self.area.iter().enumerate().map(|(e, area)| area * self.exposure.share(e as u32)).collect()
+    }
+
+    /// The same where places of a smaller scale count as if they were as wide as the rest: a flat on a wide site is a ten-thousandth
+    /// of its area, and what matters to who is in it.
+    pub(crate) fn counted_area(&self) -> Vec<f64> {
+        let (mut area, scales) = (self.exposed_area(), self.tracer.scales());
+        if !scales.is_empty() {
+            for (e, area) in area.iter_mut().enumerate() {
+                *area /= f64::from(scales[self.elements.place(e as u32).0]).powi(2);
+            }
+        }
+        area
     }
 
     /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it; with a

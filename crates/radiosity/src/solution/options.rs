@@ -4,6 +4,7 @@ use super::Solution;
 use crate::displayed::Displayed;
 use crate::equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
 use crate::{Error, Monitor};
+use radiosity_scene::CellWidth;
 use radiosity_scene::Scene;
 use radiosity_solve::{Params, Solver};
 use radiosity_trace::Tracer;
@@ -13,7 +14,8 @@ use radiosity_transport::{FormFactorMethod, Shadowing};
 /// How to solve.
 #[derive(Clone, Copy, Debug)]
 pub struct SolveOptions {
-    /// Width of a cell, metres: of an element, where direct light is even. `None` chooses it by `cells`.
+    /// Width of all cells, metres: of an element, where direct light is even. `None` chooses it by `cells`, and smaller in places hundreds
+    /// of times as narrow as most of the scene.
     pub element_size: Option<f64>,
     /// Whether what comes of it is only looked up, by a gather: triangles much smaller than cells get their share of the
     /// rays then, as the noise of many averages out.
@@ -96,9 +98,11 @@ impl SolveOptions {
         }
     }
 
-    /// Fewer cells, and none of them divided, where a matrix grows with the square of the elements.
+    /// Fewer cells, and none of them divided, where a matrix grows with the square of the elements; as many as asked where it is said
+    /// already that none is to be divided.
     pub(crate) fn suit_method(&mut self) {
-        if self.form_factors.is_some() || self.solver.is_direct() {
+        let is_stored = self.form_factors.is_some() || self.solver.is_direct();
+        if is_stored && self.variation.is_finite() {
             (self.cells, self.variation) = (self.cells.min(MATRIX_CELLS), f64::INFINITY);
         }
     }
@@ -145,18 +149,31 @@ impl SolveOptions {
         while self.rays > LEAST_RAYS && self.stored(1, 1) > 0 && lacks_room(self) {
             self.rays /= 2;
         }
-        let usual = element_size(tracer, self);
+        let usual = cell_width(tracer, self).size;
         while self.element_size.is_none() && self.cells > 1 && lacks_room(self) {
             self.cells = self.cells * 3 / 4;
         }
-        let wider = element_size(tracer, self) / usual;
+        let wider = cell_width(tracer, self).size / usual;
         if wider > 1.0 {
             monitor.note(&format!("elements are {wider:.1} times as wide as usual: memory holds no more"));
         }
     }
 }
 
-/// Width of a cell: as asked, or such that the scene's area makes as many as asked.
-pub(crate) fn element_size(tracer: &Tracer, options: &SolveOptions) -> f64 {
-    options.element_size.unwrap_or_else(|| (2.0 * tracer.mesh.whole_area() / options.cells.max(1) as f64).sqrt())
+/// Width of cells: as asked, or such that the scene's area makes as many as asked, narrower in places of a smaller scale.
+pub(crate) fn cell_width<'a>(tracer: &'a Tracer, options: &SolveOptions) -> CellWidth<'a> {
+    options.element_size.map_or_else(
+        || CellWidth {
+            size: (2.0 * scaled_area(tracer) / options.cells.max(1) as f64).sqrt(),
+            scales: tracer.scales(),
+        },
+        CellWidth::from,
+    )
+}
+
+/// Area that each triangle would have were all places of one scale, m².
+pub(crate) fn scaled_area(tracer: &Tracer) -> f64 {
+    let (mesh, scales) = (tracer.mesh, tracer.scales());
+    let scaled = |(t, scale): (usize, &f32)| mesh.area(t) / f64::from(*scale).powi(2);
+    if scales.is_empty() { mesh.whole_area() } else { scales.iter().enumerate().map(scaled).sum() }
 }

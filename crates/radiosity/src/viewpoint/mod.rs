@@ -172,7 +172,7 @@ mod tests {
     fn placed(scene: &Scene) -> (Camera, DVec3, DVec3) {
         let mesh = Mesh::new(scene);
         let camera = place_camera(&Tracer::new(scene, &mesh), None);
-        let eye = camera.world_from_camera.w_axis.truncate();
+        let eye = camera.position();
         let back = camera.world_from_camera.z_axis.truncate();
         (camera, eye, back)
     }

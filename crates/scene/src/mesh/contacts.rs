@@ -7,7 +7,7 @@
 //! has what is not opaque: grass would cut the ground to pieces, and light goes through it.
 //!
 //! Not every contact cuts. What is shorter than an element cannot part rooms: the legs of a table leave the floor as it is
-//! ([`LEAST_RUN`]). Only the edge where a sheet ends cuts at any length, for a hut of sheets in a wide landscape is smaller
+//! ([`LEAST_RUN`], [`WALL`]). Only the edge where a sheet ends cuts at any length, for a hut of sheets in a wide landscape is smaller
 //! than an element. And a triangle that is lit on one side of its contacts only, as where a pillow sinks into a couch, has
 //! nothing to be parted from: what of it is buried is left out of its elements anyway.
 
@@ -28,6 +28,10 @@ const LEAST_RUN: f64 = 1.0;
 
 /// Elements that the scene's area makes by default, from which their width follows. The mesh is the same for all.
 const ELEMENTS: f64 = 10_000.0;
+
+/// Contacts so long cut however wide elements are, metres: a wall of that length parts rooms. On a site of 400 m elements are wider than
+/// the rooms of a house, and none of its walls cut.
+const WALL: f64 = 1.0;
 
 /// Contacts in one place that each is compared with. Several are one, from the triangles on both sides of an edge and the
 /// hosts on both sides of another; beyond this, runs come out too short.
@@ -82,7 +86,7 @@ impl Mesh {
     pub(super) fn cut_along_contacts(&mut self, scene: &Scene, weld: &mut Weld) -> Contacts {
         let area = self.whole_area();
         let (mut list, found_all) = self.contacts(scene);
-        self.keep_long(&mut list, LEAST_RUN * (2.0 * area / ELEMENTS).sqrt());
+        self.keep_long(&mut list, (LEAST_RUN * (2.0 * area / ELEMENTS).sqrt()).min(WALL));
         list.sort_by_key(|contact| contact.host);
 
         // Where a triangle that has to be cut crosses another one, the other is cut there too: light breaks at a line

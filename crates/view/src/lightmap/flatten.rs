@@ -56,6 +56,21 @@ impl Charts {
         Ok(Charts { finer: vec![1.0; charts.len()], charts, triangles: input.triangles.len() })
     }
 
+    /// Finer texels where the scale of triangles is below 1.
+    pub fn narrow(&mut self, scale: impl Fn(usize) -> f64) {
+        for (chart, finer) in self.charts.iter().zip(&mut self.finer) {
+            let (mut area, mut scaled) = (0.0, 0.0);
+            for (&triangle, [a, b, c]) in chart.triangles.iter().zip(&chart.local) {
+                let own = (*b - *a).perp_dot(*c - *a).abs();
+                area += own;
+                scaled += own / scale(triangle as usize).powi(2);
+            }
+            if area > 0.0 {
+                *finer = (scaled / area).sqrt();
+            }
+        }
+    }
+
     /// Number of charts.
     pub fn len(&self) -> usize {
         self.charts.len()
