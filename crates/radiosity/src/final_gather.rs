@@ -113,6 +113,34 @@ impl Wanted {
     }
 }
 
+/// What blocks around a place found.
+#[derive(Default)]
+struct Between {
+    total: f32,
+    /// Sum of what is beyond the field.
+    beyond: Bands,
+    /// Least and most of those that count.
+    range: Option<[Bands; 2]>,
+}
+
+impl Between {
+    fn add(&mut self, weight: f32, found: Bands, field: Bands) {
+        if weight > 0.0 {
+            self.total += weight;
+            self.beyond = std::array::from_fn(|k| self.beyond[k] + weight * (found[k] - field[k]));
+            let [low, high] = self.range.unwrap_or([found; 2]);
+            self.range =
+                Some([std::array::from_fn(|k| low[k].min(found[k])), std::array::from_fn(|k| high[k].max(found[k]))]);
+        }
+    }
+
+    /// Light at the place by that of the field there.
+    fn with(&self, field: Bands) -> Bands {
+        let [low, high] = self.range.unwrap_or([field; 2]);
+        std::array::from_fn(|k| (field[k] + self.beyond[k] / self.total).clamp(low[k], high[k]))
+    }
+}
+
 /// What of a picture gathers, and the rest.
 struct Blocks<'a> {
     view: &'a ViewRays,
@@ -175,8 +203,7 @@ pub(crate) fn indirect(
         if !solution.options.looked_up {
             blocks.unless_sure(&mut found, &field, &halves);
         }
-        let beyond = |(found, field): (&Bands, &Bands)| std::array::from_fn(|k| found[k] - field[k]);
-        blocks.add(&found.iter().zip(&field).map(beyond).collect::<Vec<Bands>>(), &mut light);
+        blocks.add(&found, &field, &mut light);
     }
     Ok((light, is_whole))
 }
@@ -368,26 +395,23 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// Adds to the light of all places of the blocks what lies between what chosen ones have `beyond` it, on the same surface in these and in those
-    /// around; never less than nothing is left.
-    fn add(&self, beyond: &[Bands], light: &mut [Bands]) {
+    /// Adds to the `light` of all places of the blocks, the field, what lies between what chosen ones `found` beyond theirs, on the same surface in these
+    /// and in those around; never more or less is left than these found: where the field is steep it knows no better.
+    fn add(&self, found: &[Bands], field: &[Bands], light: &mut [Bands]) {
         let of_block = |(number, block): (usize, &Block)| -> SmallVec<[(u32, Bands); 4]> {
             let of_place = |&place: &u32| {
-                let own = self.tent(place, block.chosen).max(LEAST_WEIGHT);
-                let (mut sum, mut total) = (beyond[number].map(|e| own * e), own);
-                for &other in &self.beside[number] {
-                    let weight = self.tent(place, self.blocks[other as usize].chosen);
-                    (0..3).for_each(|band| sum[band] += weight * beyond[other as usize][band]);
-                    total += weight;
+                let mut seen = Between::default();
+                seen.add(self.tent(place, block.chosen).max(LEAST_WEIGHT), found[number], field[number]);
+                for other in self.beside[number].iter().map(|other| *other as usize) {
+                    seen.add(self.tent(place, self.blocks[other].chosen), found[other], field[other]);
                 }
-                (place, sum.map(|sum| sum / total))
+                (place, seen.with(light[place as usize]))
             };
             block.places.iter().map(of_place).collect()
         };
         let all: Vec<_> = self.blocks.par_iter().enumerate().map(of_block).collect();
-        for (place, more) in all.into_iter().flatten() {
-            let light = &mut light[place as usize];
-            *light = std::array::from_fn(|k| (light[k] + more[k]).max(0.0));
+        for (place, all) in all.into_iter().flatten() {
+            light[place as usize] = all;
         }
     }
 
