@@ -1,6 +1,7 @@
 //! A sealed dark room beside a bright one gets less than a millionth of its light.
 
 use super::*;
+use radiosity::{Camera, RenderOptions, render};
 
 /// A sealed dark room, x > 2, beside a bright one, their common wall of zero thickness: one-sided faces back to back,
 /// or a single double-sided sheet. Objects of the dark room are called so.
@@ -159,14 +160,14 @@ fn behind_a_wall(thickness: f64, sunk: f64) -> Scene {
 }
 
 /// What must hold of a scene of two rooms parted at `middle`: with a lamp in the lower one of them, the other reads less
-/// than a millionth of it, in elements, at points, in texels and at vertices.
+/// than a millionth of it, in elements, at points, in texels, at vertices and in pictures.
 fn assert_no_light_leaks(mut scene: Scene, middle: Range<f64>, named: &str) {
     let lamp = [[0.5, 0.5, 1.9], [0.5, 1.5, 1.9], [1.2, 1.5, 1.9], [1.2, 0.5, 1.9]];
     scene.materials.push(matte("lamp", [0.0; 3], [1000.0; 3]));
     scene.add_quad("lamp", scene.materials.len() - 1, lamp.map(DVec3::from));
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
-    let (mut bright, mut leaked) = ([0f32; 4], [0f32; 4]);
+    let (mut bright, mut leaked) = ([0f32; 5], [0f32; 5]);
     // The front of a sheet looks into the bright room.
     let is_dark = |object: usize, x: f64, flipped: bool| {
         if scene.objects[object].name == "sheet" { flipped } else { x > middle.end - 1e-9 }
@@ -216,7 +217,15 @@ fn assert_no_light_leaks(mut scene: Scene, middle: Range<f64>, named: &str) {
             }
         }
     }
-    for way in 0..4 {
+    // Seen from the far end of either room, the foot of the wall in the middle.
+    for (is_dark, x) in [(false, 0.3), (true, 3.7)] {
+        let foot = DVec3::new(if is_dark { middle.end } else { middle.start }, 1.2, 0.0);
+        let camera = Camera::look_at("", DVec3::new(x, 0.3, 1.6), foot, DVec3::Z, 1.2);
+        let size = RenderOptions { width: 120, height: 90, ..RenderOptions::default() };
+        let view = render(&baked, &camera, &size, &()).unwrap();
+        view.illuminance.iter().filter(|lux| lux.is_finite()).for_each(|lux| count(4, is_dark, *lux));
+    }
+    for way in 0..5 {
         assert!(bright[way] > 100.0, "{named}: {bright:?}");
         assert!(leaked[way] < 1e-6 * bright[way], "{named}: {leaked:?} of {bright:?}");
     }
