@@ -119,7 +119,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         .then(|| views::camera(&input.scene, &tracer, &arguments.picture, &arguments.scene, progress))
         .transpose()?;
 
-    let eyes = views::eyes(&input.scene, &tracer, camera.as_ref());
+    let eyes = views::eyes(&input.scene, &tracer, &arguments.picture);
     let tracer = tracer.seen_from(&eyes);
     progress.parts();
     arguments.solve.warn_of_methods(progress);

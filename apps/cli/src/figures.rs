@@ -60,7 +60,7 @@ pub const ABOUT: &[(&str, &str)] = &[
     ("lightmap.needed", "texels that the error asked would take, about; null where it is met or this is not known"),
     ("balance", "lm by colour band, for a flux of that band alone"),
     ("balance.defect", DEFECT),
-    ("solution.element_size", "m; width of an element"),
+    ("solution.element_size", "m; width of an element, of the widest where what is seen has smaller ones"),
     ("solution.raw_closure", CLOSURE),
     ("solution.relative_residual", RESIDUAL),
     ("solution.guaranteed_bound", BOUND),

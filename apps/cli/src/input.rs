@@ -76,7 +76,7 @@ pub struct SolveArguments {
     /// Relative error of irradiance to reach, e.g. 1% or 0.01.
     #[arg(long, default_value = "1%", value_name = "PERCENT", allow_hyphen_values = true, value_parser = numbers::error)]
     pub error: f64,
-    /// Width of an element in metres, instead of letting the program choose.
+    /// Width of all elements in metres, instead of letting the program choose.
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = numbers::positive)]
     pub element_size: Option<f64>,
     /// Memory for the scene and all that is worked out, e.g. 4G or 500M, also written 4GiB or 500MB; powers of 1024. What does not

@@ -188,7 +188,7 @@ impl ErrorReport {
 pub struct SolutionReport {
     /// Elements.
     pub elements: usize,
-    /// Width of an element, metres.
+    /// Width of an element, metres; of the widest where what is seen has smaller ones.
     pub element_size: f64,
     /// Elements that lie inside solids.
     pub buried: usize,
@@ -292,11 +292,11 @@ impl Report {
                 };
                 format!("the lightmap has {texels} texels, {density:.1}{finest} per metre{needed}; {advice}")
             }
-            None => format!(
-                "vertices are {:.3} m apart, try --element-size {:.3}",
-                solution.element_size,
-                0.5 * solution.element_size
-            ),
+            None => {
+                let scales = solution.tracer().scales().iter().copied();
+                let width = solution.element_size * f64::from(scales.fold(1.0, f32::min));
+                format!("vertices are {width:.3} m apart, try --element-size {:.3}", 0.5 * width)
+            }
         };
         let lights = solution.luminaires.lights.iter().enumerate();
         let light = |(i, name): (usize, &str)| match name {

@@ -139,10 +139,11 @@ pub fn camera(
     Ok(camera)
 }
 
-/// Where light that is written will be looked at from, as far as that is known: the scene's cameras and the one that is chosen, else
-/// where one would be placed.
-pub fn eyes(scene: &Scene, tracer: &Tracer, chosen: Option<&Camera>) -> Vec<DVec3> {
-    let mut eyes: Vec<DVec3> = scene.cameras.iter().chain(chosen).map(Camera::position).collect();
+/// Where light that is written will be looked at from, as far as that is known: from the scene's cameras and the eye that is asked for,
+/// else from where a camera would be placed, whether or not a picture is wanted.
+pub fn eyes(scene: &Scene, tracer: &Tracer, asked: &PictureArguments) -> Vec<DVec3> {
+    let asked = asked.eye.map(DVec3::from);
+    let mut eyes: Vec<DVec3> = scene.cameras.iter().map(Camera::position).chain(asked).collect();
     if eyes.is_empty() {
         eyes.push(radiosity::place_camera(tracer, None).position());
     }

@@ -135,9 +135,11 @@ pub const TABLE_TOLERANCE: f64 = 1e-6;
 /// Work between two looks at what is displayed, applications of F: a look costs about as much as a tenth of one.
 const LOOK: f64 = 0.5;
 
-/// Sweeps that are made whether or not there is time, where one is a step: of [`FEW`] elements, of which one takes some milliseconds
-/// and so many solve a room, and of more, which without some had no reflected light.
-const FIRST_SWEEPS: [f64; 2] = [32.0, 4.0];
+/// Sweeps that are made whether or not there is time, where one is a step: without some there is no reflected light, and so many solve a
+/// room, where one of so many rays takes some milliseconds.
+const FIRST_SWEEPS: f64 = 4.0;
+const SOLVING_SWEEPS: f64 = 32.0;
+const FEW_RAYS: usize = 64 * FEW;
 
 /// How to solve, and when an iterate will do.
 pub(crate) struct Task<'a> {
@@ -159,7 +161,8 @@ pub(crate) fn solve(
     let solver = task.solver;
     let mut way = Way::new(solver.is_random(), task.params.tolerance, &response.diffuse.reflectance);
     let (mut looked, mut reached) = (f64::NEG_INFINITY, f64::INFINITY);
-    let first_sweeps = FIRST_SWEEPS[usize::from(x.len() > 3 * FEW)];
+    let is_quick = x.len() / 3 * table.columns() <= FEW_RAYS;
+    let first_sweeps = if is_quick { SOLVING_SWEEPS } else { FIRST_SWEEPS };
     let step = |x: &[f64], info: &Info| {
         if !monitor.step(way.done(info), PARTS) {
             return Go::Stop;

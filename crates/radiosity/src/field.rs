@@ -166,9 +166,10 @@ impl Solution<'_> {
         Field::pooled(self.tracer().mesh, &self.elements, light, &self.exposed_area())
     }
 
-    /// Noise that rays leave in the field of `light`: root mean square over the exposed area.
+    /// Noise that rays leave in the field of `light`: root mean square over the exposed area as it counts.
     pub(crate) fn field_noise(&self, light: &[[Bands; 2]]) -> f64 {
-        self.noise(light, |_, exposed| exposed)
+        let triangle = |cell: usize| self.elements.place(self.elements.of_cell(cell).start).0;
+        self.noise(light, |cell, exposed| exposed * self.counts(triangle(cell)))
     }
 
     /// The noise that is left in the field of light by element, in halves, as half the difference of the fields of either half

@@ -137,7 +137,8 @@ impl Between {
     /// Light at the place by that of the field there.
     fn with(&self, field: Bands) -> Bands {
         let [low, high] = self.range.unwrap_or([field; 2]);
-        std::array::from_fn(|k| (field[k] + self.beyond[k] / self.total).clamp(low[k], high[k]))
+        // Light beyond single precision must not end in a panic.
+        std::array::from_fn(|k| (field[k] + self.beyond[k] / self.total).max(low[k]).min(high[k]))
     }
 }
 

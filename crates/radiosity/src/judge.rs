@@ -367,7 +367,7 @@ pub(crate) fn thinned(rays: usize, part: f64) -> usize {
     ((rays as f64 * part) as usize).max(rays.min(LEAST_RAYS as usize))
 }
 
-/// Root mean square illuminance over the exposed surfaces, lx: what relative errors are relative to.
+/// Root mean square illuminance over the exposed surfaces as they count, lx: what relative errors are relative to.
 pub(crate) fn root_mean_square(solution: &Solution) -> f64 {
     let weight = solution.counted_area();
     let square = |(h, w): (&Bands, &f64)| w * f64::from(luminance(*h)).powi(2);

@@ -1,4 +1,4 @@
-//! Places on surfaces: spread by area for audits, snapped to the surface for measuring points.
+//! Places on surfaces: spread by area, as it counts, for audits, snapped to the surface for measuring points.
 
 use crate::Solution;
 use crate::answer::Station;

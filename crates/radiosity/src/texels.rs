@@ -102,7 +102,8 @@ pub(crate) fn light(
     let halves = solution.direct_halves_of(&solution.places(places.clone(), 1), &shadowing(shadow / 2), monitor)?;
     let mut direct = Found::of_halves(&halves, shadow as u32, evened);
     let (mut gathered, mut indirect) = shared(first)?;
-    let area = sheet.atlas.areas(sheet.texels);
+    let mut area = sheet.atlas.areas(sheet.texels);
+    area.iter_mut().zip(&places).for_each(|(area, place)| *area *= solution.counts(place.triangle as usize));
     let size = root_mean_square(solution);
     let ceiling =
         |(d, p): (&Bands, &Pooled)| VISIBLE * error * f64::from(luminance(*d) + luminance(p.light)).max(DARK * size);

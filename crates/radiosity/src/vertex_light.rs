@@ -342,7 +342,8 @@ impl Lattice {
                     }
                 }
             }
-            sum * solution.tracer().mesh.area(face.triangle) / (f64::from(k) * f64::from(k))
+            let area = solution.tracer().mesh.area(face.triangle) * solution.counts(face.triangle);
+            sum * area / (f64::from(k) * f64::from(k))
         };
         faces.par_iter().zip(&self.corners).map(of).collect()
     }

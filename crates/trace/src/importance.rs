@@ -44,17 +44,20 @@ pub(crate) fn scales(tracer: &Tracer, eyes: &[DVec3]) -> Vec<f32> {
     visited.iter().for_each(|&triangle| visits[triangle as usize] += 1);
 
     let per_area = visited.len() as f64 / mesh.whole_area();
-    let mut scales = Vec::with_capacity(visits.len());
+    let mut scales: Vec<f32> = Vec::with_capacity(visits.len());
     let (mut area, mut count) = (0.0, 0);
     for (t, own) in visits.iter().enumerate() {
         area += mesh.area(t);
         count += own;
-        if count >= KNOWN || per_area * area >= f64::from(KNOWN) || t + 1 == visits.len() {
-            let usual = USUAL * per_area * area / f64::from(count);
+        if count >= KNOWN || per_area * area >= f64::from(KNOWN) {
+            let usual = USUAL * per_area * area / f64::from(count.max(1));
             scales.resize(t + 1, usual.sqrt().clamp(LEAST, 1.0) as f32);
             (area, count) = (0.0, 0);
         }
     }
+    // What is left at the end is known as little as its neighbours are far.
+    let last = scales.last().copied().unwrap_or(1.0);
+    scales.resize(visits.len(), last);
     if scales.iter().all(|scale| *scale == 1.0) { Vec::new() } else { scales }
 }
 

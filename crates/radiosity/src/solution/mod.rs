@@ -57,7 +57,7 @@ pub struct Solution<'a> {
     pub info: Info,
     /// Time by stage.
     pub stages: Stages,
-    /// Width of a cell, metres.
+    /// Width of a cell, metres; of the widest where what is seen has smaller ones.
     pub element_size: f64,
     sky: SkyPatches,
     table: HitTable,
@@ -504,16 +504,17 @@ impl<'a> Solution<'a> {
         self.area.iter().enumerate().map(|(e, area)| area * self.exposure.share(e as u32)).collect()
     }
 
-    /// The same where places of a smaller scale count as if they were as wide as the rest: a flat on a wide site is a ten-thousandth
-    /// of its area, and what matters to who is in it.
+    /// The same as it counts.
     pub(crate) fn counted_area(&self) -> Vec<f64> {
-        let (mut area, scales) = (self.exposed_area(), self.tracer.scales());
-        if !scales.is_empty() {
-            for (e, area) in area.iter_mut().enumerate() {
-                *area /= f64::from(scales[self.elements.place(e as u32).0]).powi(2);
-            }
-        }
+        let mut area = self.exposed_area();
+        area.iter_mut().enumerate().for_each(|(e, area)| *area *= self.counts(self.elements.place(e as u32).0));
         area
+    }
+
+    /// How many times its area a triangle counts: places of a smaller scale as if they were as wide as the rest. A flat on a wide site is
+    /// a thousandth of its area, and what matters to who is in it.
+    pub(crate) fn counts(&self, triangle: usize) -> f64 {
+        self.tracer.scales().get(triangle).map_or(1.0, |scale| f64::from(*scale).powi(-2))
     }
 
     /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it; with a

@@ -4,8 +4,7 @@ use super::Solution;
 use crate::displayed::Displayed;
 use crate::equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
 use crate::{Error, Monitor};
-use radiosity_scene::CellWidth;
-use radiosity_scene::Scene;
+use radiosity_scene::{CellWidth, Scene};
 use radiosity_solve::{Params, Solver};
 use radiosity_trace::Tracer;
 use radiosity_transport::exposure::Care;
@@ -14,8 +13,8 @@ use radiosity_transport::{FormFactorMethod, Shadowing};
 /// How to solve.
 #[derive(Clone, Copy, Debug)]
 pub struct SolveOptions {
-    /// Width of all cells, metres: of an element, where direct light is even. `None` chooses it by `cells`, and smaller in places hundreds
-    /// of times as narrow as most of the scene.
+    /// Width of all cells, metres: of an element, where direct light is even. `None` chooses it by `cells`, and smaller where a surface is
+    /// more important than its area tells ([`Tracer::seen_from`]).
     pub element_size: Option<f64>,
     /// Whether what comes of it is only looked up, by a gather: triangles much smaller than cells get their share of the
     /// rays then, as the noise of many averages out.
@@ -23,7 +22,7 @@ pub struct SolveOptions {
     /// Whether points of the elements are shown, as texels are. Then what lies inside of solids that touch each other is told from what is
     /// seen, which takes longer; who asks for points of their own does without.
     pub shown: bool,
-    /// How many cells to aim for on top of one per triangle. At ten thousand the walls of a room are cut into cells of
+    /// How many cells to aim for on top of one per triangle; two thousand at most where a matrix grows with their square and `variation` is finite. At ten thousand the walls of a room are cut into cells of
     /// some 15 cm, and their light varies by a few percent from cell to cell.
     pub cells: usize,
     /// How much direct light may vary within elements: the flux that leaves them by their standard deviation, relative
@@ -174,6 +173,6 @@ pub(crate) fn cell_width<'a>(tracer: &'a Tracer, options: &SolveOptions) -> Cell
 /// Area that each triangle would have were all places of one scale, m².
 pub(crate) fn scaled_area(tracer: &Tracer) -> f64 {
     let (mesh, scales) = (tracer.mesh, tracer.scales());
-    let scaled = |(t, scale): (usize, &f32)| mesh.area(t) / f64::from(*scale).powi(2);
+    let scaled = |(t, scale): (usize, &f32)| mesh.area(t) * f64::from(*scale).powi(-2);
     if scales.is_empty() { mesh.whole_area() } else { scales.iter().enumerate().map(scaled).sum() }
 }

@@ -22,6 +22,7 @@ mod planes;
 mod refusals;
 #[path = "../common/room.rs"]
 mod room;
+mod sites;
 #[path = "../common/small.rs"]
 mod small;
 mod stopping;

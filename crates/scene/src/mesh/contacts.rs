@@ -86,15 +86,16 @@ impl Mesh {
     pub(super) fn cut_along_contacts(&mut self, scene: &Scene, weld: &mut Weld) -> Contacts {
         let area = self.whole_area();
         let (mut list, found_all) = self.contacts(scene);
-        self.keep_long(&mut list, (LEAST_RUN * (2.0 * area / ELEMENTS).sqrt()).min(WALL));
+        let run = LEAST_RUN * (2.0 * area / ELEMENTS).sqrt();
+        self.keep_long(&mut list, run.min(WALL));
         list.sort_by_key(|contact| contact.host);
 
         // Where a triangle that has to be cut crosses another one, the other is cut there too: light breaks at a line
         // only where both have their vertices on it.
         let parted: Vec<u32> = list
             .chunk_by(|a, b| a.host == b.host)
-            .filter(|run| self.parts(scene, run))
-            .map(|run| run[0].host)
+            .filter(|contacts| self.parts(scene, contacts, run > WALL))
+            .map(|contacts| contacts[0].host)
             .collect();
         let is_parted = |t: u32| parted.binary_search(&t).is_ok();
         list.retain(|contact| {
@@ -346,24 +347,34 @@ impl Mesh {
     }
 
     /// Whether contacts on one triangle part what is lit of it: a surface that is lit on both sides does, and so do two that
-    /// look away from each other. Behind a single one-sided surface all is dark.
-    fn parts(&self, scene: &Scene, list: &[Contact]) -> bool {
+    /// look away from each other. Behind a single one-sided surface all is dark, but not far behind the walls of a room without outsides whose
+    /// floor is a part of a wide ground: there are two that look at each other.
+    fn parts(&self, scene: &Scene, list: &[Contact], is_wide: bool) -> bool {
         // The ends of each, and the unit normal of the other triangle, if all is dark on its back.
         let seen = |contact: &Contact| {
             let double_sided = scene.material(self.source[contact.other as usize] as usize).has_two_sides();
             (self.ends(contact), (!double_sided).then(|| self.normal(contact.other as usize)))
         };
+        let host = self.corners(list[0].host as usize);
+        let goes_on_behind = |front: DVec3, [end, _]: &[DVec3; 2]| {
+            is_wide && host.iter().any(|corner| (*corner - *end).dot(front) < -WALL)
+        };
         let list: Vec<([DVec3; 2], Option<DVec3>)> = list.iter().map(seen).collect();
         let mut compared = 0;
         list.iter().enumerate().any(|(n, (a, front))| {
             let Some(front) = *front else { return true };
+            let may_be_room = goes_on_behind(front, a);
             list[n + 1..].iter().any(|(b, other)| {
                 compared += 1;
-                let behind = |front: DVec3, of: &[DVec3; 2], all: &[DVec3; 2]| {
-                    all.iter().all(|end| (*end - of[0]).dot(front) <= self.tolerance)
+                let on = |side: f64, front: DVec3, of: &[DVec3; 2], all: &[DVec3; 2]| {
+                    all.iter().all(|end| side * (*end - of[0]).dot(front) <= self.tolerance)
                 };
+                let away = |side: f64, other: DVec3| on(side, front, a, b) && on(side, other, b, a);
                 compared > MOST_COMPARED
-                    || other.is_none_or(|other| front.dot(other) < 0.0 && behind(front, a, b) && behind(other, b, a))
+                    || other.is_none_or(|other| {
+                        let is_opposite = front.dot(other) < 0.0;
+                        (is_opposite && away(1.0, other)) || (may_be_room && !away(1.0, other) && away(-1.0, other))
+                    })
             })
         })
     }

@@ -152,10 +152,11 @@ impl Charts {
         let most_finer: Vec<f64> = all
             .clone()
             .map(|k| {
-                (room / (density(k) * self.charts[k].extent.max_element())).min(MOST_FINER / self.finer[k]).max(1.0)
+                let wide = density(k) * self.narrow[k] * self.charts[k].extent.max_element();
+                (room / wide).min(MOST_FINER / self.finer[k]).max(1.0)
             })
             .collect();
-        // What is lost by area, for the texels of charts are not of one size.
+        // What is lost by area, for the texels of charts are not of one size; those of smaller places count by as much more.
         let lost: Vec<f64> = all.clone().map(|k| detail.lost[k] / density(k).powi(2)).collect();
         let count: Vec<f64> = all.clone().map(|k| self.count(k, params.texels_per_metre)).collect();
         let total: f64 = lost.iter().sum();

@@ -12,6 +12,8 @@ pub struct Charts {
     pub(super) charts: Vec<Chart>,
     /// By chart, its texels per metre over those asked for: 1 but where [`Charts::allot`] gave more.
     pub finer: Vec<f64>,
+    /// By chart, the same where it is part of a place of a smaller scale, which counts by as much more ([`Charts::narrow`]).
+    pub(super) narrow: Vec<f64>,
     pub(super) triangles: usize,
 }
 
@@ -53,12 +55,13 @@ impl Charts {
         let mut charts: Vec<Chart> =
             regions.par_iter().flat_map_iter(|region| flatten(input, &across, region)).collect();
         charts.sort_by_key(|chart| chart.triangles[0]);
-        Ok(Charts { finer: vec![1.0; charts.len()], charts, triangles: input.triangles.len() })
+        let ones = vec![1.0; charts.len()];
+        Ok(Charts { finer: ones.clone(), narrow: ones, charts, triangles: input.triangles.len() })
     }
 
-    /// Finer texels where the scale of triangles is below 1.
+    /// Finer texels where the scale of triangles is below 1; where light is rough they become finer from there on.
     pub fn narrow(&mut self, scale: impl Fn(usize) -> f64) {
-        for (chart, finer) in self.charts.iter().zip(&mut self.finer) {
+        for (chart, narrow) in self.charts.iter().zip(&mut self.narrow) {
             let (mut area, mut scaled) = (0.0, 0.0);
             for (&triangle, [a, b, c]) in chart.triangles.iter().zip(&chart.local) {
                 let own = (*b - *a).perp_dot(*c - *a).abs();
@@ -66,7 +69,7 @@ impl Charts {
                 scaled += own / scale(triangle as usize).powi(2);
             }
             if area > 0.0 {
-                *finer = (scaled / area).sqrt();
+                *narrow = (scaled / area).sqrt();
             }
         }
     }

@@ -185,11 +185,12 @@ impl Charts {
         params.check()?;
         let mut reduced = 0;
         let mut charts = Vec::with_capacity(self.charts.len());
-        for (index, (chart, finer)) in self.charts.iter().zip(&self.finer).enumerate() {
+        for (index, chart) in self.charts.iter().enumerate() {
+            let (finer, narrow) = (self.finer[index], self.narrow[index]);
             // Scale to texels; too large a chart gets what a page can hold.
             let most = f64::from(params.max_page - 1) / chart.extent.max_element();
-            reduced += usize::from(params.texels_per_metre > most);
-            let scale = (params.texels_per_metre * finer).min(most);
+            reduced += usize::from(params.texels_per_metre * narrow > most);
+            let scale = (params.texels_per_metre * narrow * finer).min(most);
             let axes =
                 [chart.extent.x, chart.extent.y].map(|extent| axis(extent * scale, chart.rectangle, params.max_page));
             let stretch = DVec2::new(axes[0].stretch, axes[1].stretch) * scale;
@@ -198,7 +199,7 @@ impl Charts {
                 local: chart.local.iter().map(|corners| corners.map(|p| p * stretch)).collect(),
                 collapsed: axes.map(|axis| axis.collapsed),
                 size: axes.map(|axis| axis.count),
-                texel: chart.area / self.count(index, scale / finer),
+                texel: chart.area / self.count(index, scale / (narrow * finer)),
                 at: Placement::default(),
             });
         }
@@ -237,7 +238,8 @@ impl Charts {
 
     /// The same for one chart.
     fn count(&self, chart: usize, texels_per_metre: f64) -> f64 {
-        let (chart, density) = (&self.charts[chart], texels_per_metre * self.finer[chart]);
+        let density = texels_per_metre * self.narrow[chart] * self.finer[chart];
+        let chart = &self.charts[chart];
         let [x, y] = [chart.extent.x, chart.extent.y].map(|extent| axis(extent * density, chart.rectangle, u32::MAX));
         let all = f64::from(x.count) * f64::from(y.count);
         // Area of the chart widened by a bilinear footprint (a square of two texels): Steiner's formula.
