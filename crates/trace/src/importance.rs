@@ -18,11 +18,19 @@ const VISITED: usize = 8;
 /// The streams of numbers that they use.
 const PATHS: u64 = 0x50bb << 32;
 
-/// Visits by which importance is known. Smaller triangles share those of their neighbours in the list.
+/// Visits by which importance is known. Triangles with fewer, and those of one wall, share those of their neighbours in the list.
 const KNOWN: u32 = 32;
 
 /// So many times as important for its area as the scene is on average a surface is in any room, where an eye is near it.
 const USUAL: f64 = 4.0;
+
+/// Cosine beyond which two triangles are parts of one wall.
+const FLAT: f64 = 0.9999;
+
+/// Standard errors by which visits of a piece of a wall may differ from what those of the rest tell, and the part of them, as a wall is
+/// more important beside a window: else it is of another room.
+const CHANCE: f64 = 3.0;
+const UNLIKE: f64 = 0.75;
 
 /// The narrowest scale.
 const LEAST: f64 = 1.0 / 256.0;
@@ -49,7 +57,15 @@ pub(crate) fn scales(tracer: &Tracer, eyes: &[DVec3]) -> Vec<f32> {
     for (t, own) in visits.iter().enumerate() {
         area += mesh.area(t);
         count += own;
-        if count >= KNOWN || per_area * area >= f64::from(KNOWN) {
+        // Cells of one wall are as wide on all its pieces, or light would break where they meet.
+        let is_large = |t: usize| per_area * mesh.area(t) >= f64::from(KNOWN);
+        let is_alike = |next: usize| {
+            let (expected, found) = (f64::from(count) / area * mesh.area(next), f64::from(visits[next]));
+            let most = found.max(expected);
+            (found - expected).abs() <= (CHANCE * most.sqrt()).max(UNLIKE * most)
+        };
+        let goes_on = t + 1 < visits.len() && !is_large(t) && !is_large(t + 1) && is_flat(mesh, t) && is_alike(t + 1);
+        if (count >= KNOWN || per_area * area >= f64::from(KNOWN)) && !goes_on {
             let usual = USUAL * per_area * area / f64::from(count.max(1));
             scales.resize(t + 1, usual.sqrt().clamp(LEAST, 1.0) as f32);
             (area, count) = (0.0, 0);
@@ -59,6 +75,11 @@ pub(crate) fn scales(tracer: &Tracer, eyes: &[DVec3]) -> Vec<f32> {
     let last = scales.last().copied().unwrap_or(1.0);
     scales.resize(visits.len(), last);
     if scales.iter().all(|scale| *scale == 1.0) { Vec::new() } else { scales }
+}
+
+/// Whether a triangle and the next one face the same way.
+fn is_flat(mesh: &Mesh, triangle: usize) -> bool {
+    mesh.normal(triangle).dot(mesh.normal(triangle + 1)) > FLAT
 }
 
 /// The triangles that a walk from an eye comes to.
