@@ -400,6 +400,7 @@ impl<'a> Solution<'a> {
         let task = Task {
             solver: self.options.solver,
             params: &self.options.params,
+            is_uneven: !self.tracer.scales().is_empty(),
             displayed: screen.as_ref().map(|(screen, asked)| (screen, *asked)),
         };
         let operator = (&self.table, self.matrix.as_ref());

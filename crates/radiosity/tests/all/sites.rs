@@ -2,7 +2,10 @@
 
 use glam::{DVec3, UVec2, Vec2};
 use radiosity::io::gltf_out::{Light, LitPrimitive};
-use radiosity::{BakeOptions, Material, MeasureOptions, Mesh, Scene, Sky, Tracer, bake, lightmap, luminance, measure};
+use radiosity::{
+    BakeOptions, Material, MeasureOptions, Mesh, Scene, Sky, Solution, SolveOptions, Tracer, bake, lightmap, luminance,
+    measure,
+};
 
 /// What is asked of what is written.
 const ERROR: f64 = 0.05;
@@ -32,6 +35,19 @@ fn room_on(half: DVec3) -> Scene {
     let ground = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
     scene.add_quad("ground", 0, ground.map(|(u, w)| middle + DVec3::new(u * half.x, 0.0, w * half.z)));
     scene
+}
+
+/// Mean illuminance of what counts, by the solution alone.
+fn solved(tracer: &Tracer, counts: impl Fn(usize) -> bool) -> f64 {
+    let solution = Solution::new(tracer, &SolveOptions { rays: 256, ..SolveOptions::default() }, &()).unwrap();
+    let (mut sum, mut all) = (0.0, 0.0);
+    for (e, (h, area)) in solution.irradiance().iter().zip(solution.exposed_area()).enumerate() {
+        if counts(solution.elements.place(e as u32).0) {
+            sum += area * f64::from(luminance(*h));
+            all += area;
+        }
+    }
+    sum / all
 }
 
 /// Texels between the first two corners of something that is written.
@@ -67,9 +83,14 @@ fn a_room_on_a_wide_site_is_lit_as_it_is_alone() {
     let all: f32 = alone.iter().map(|e| e.powi(2)).sum();
     assert!((off / all).sqrt() < 0.02, "{on_site:?} {alone:?}");
 
-    // As it is cut and written: nothing of the room is known to who looks from nowhere.
+    // As it is cut, solved and written: nothing of the room is known to who looks from nowhere.
     let mesh = Mesh::new(&wide);
     let is_room = |t: usize| mesh.corners(t).iter().all(|p| p.distance(0.5 * SIDES) < SIDES.length());
+    let small = room_on(0.5 * SIDES);
+    let small_mesh = Mesh::new(&small);
+    let alone = solved(&Tracer::new(&small, &small_mesh), |_| true);
+    let on_site = solved(&Tracer::new(&wide, &mesh).seen_from(&[eye]), is_room);
+    assert!((on_site / alone - 1.0).abs() < 0.02, "{on_site} {alone}");
     let written = |tracer: &Tracer| {
         let baked = bake(tracer, &BakeOptions { error: ERROR, ..BakeOptions::default() }, &()).unwrap();
         let map = lightmap(&baked, None, 2048, &()).unwrap();
