@@ -129,10 +129,9 @@ pub fn lightmap(
     let mut params = UnwrapParams { max_page, ..UnwrapParams::default() };
     monitor.stage("unwrap");
     let mut canvas = Canvas::new(&baked.solution, &params)?;
-    let scales = baked.solution.tracer().scales();
-    if texels_per_metre.is_none() && !scales.is_empty() {
+    if texels_per_metre.is_none() {
         let Canvas { faces, charts, .. } = &mut canvas;
-        charts.narrow(|face| f64::from(scales[faces[face].triangle]));
+        charts.narrow(|face| baked.solution.tracer().scale(faces[face].triangle));
     }
     let most = (baked.solution.memory_allowed() / TEXEL_BYTES) as f64;
     let budget = automatic_texels(canvas.charts.len()).min(most);

@@ -35,11 +35,10 @@ impl SolveOptions {
 /// chord). Rays that leave the scene, and those within solids, do not count; infinite where there are no others. Where scales differ
 /// distances are those of the widest place: relative to the scale of the place.
 fn mean_path(tracer: &Tracer) -> f64 {
-    let (mesh, scales) = (tracer.mesh, tracer.scales());
-    let scale = |triangle: usize| scales.get(triangle).map_or(1.0, |scale| f64::from(*scale));
+    let mesh = tracer.mesh;
     let below: Vec<f64> = (0..mesh.triangles.len())
         .scan(0.0, |sum, triangle| {
-            *sum += mesh.area(triangle) / scale(triangle).powi(2);
+            *sum += mesh.area(triangle) / tracer.scale(triangle).powi(2);
             Some(*sum)
         })
         .collect();
@@ -51,7 +50,7 @@ fn mean_path(tracer: &Tracer) -> f64 {
             let [u, v, x, y] = sequence.point(index).map(f64::from);
             let wanted = (f64::from(index) + f64::from(unit(hash(index)))) / f64::from(RAYS) * total;
             let triangle = below.partition_point(|sum| *sum <= wanted).min(below.len() - 1);
-            let (scale, (x, y)) = (scale(triangle), triangle_from_square(x, y));
+            let (scale, (x, y)) = (tracer.scale(triangle), triangle_from_square(x, y));
             let normal = mesh.normal(triangle);
             let place = Place { point: mesh.point(triangle, DVec2::new(x, y)), normal, triangle: triangle as u32 };
             let ray = tracer.ray(&place, cosine_direction(&frame(normal), u, v), f64::INFINITY);

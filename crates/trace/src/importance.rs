@@ -71,7 +71,7 @@ pub(crate) fn scales(tracer: &Tracer, eyes: &[DVec3]) -> Vec<f32> {
             (area, count) = (0.0, 0);
         }
     }
-    // What is left at the end is known as little as its neighbours are far.
+    // Too few at the end to be known share with those before.
     let last = scales.last().copied().unwrap_or(1.0);
     scales.resize(visits.len(), last);
     if scales.iter().all(|scale| *scale == 1.0) { Vec::new() } else { scales }

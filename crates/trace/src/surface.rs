@@ -229,6 +229,11 @@ impl<'a> Tracer<'a> {
         &self.scales
     }
 
+    /// That of a triangle.
+    pub fn scale(&self, triangle: usize) -> f64 {
+        self.scales.get(triangle).map_or(1.0, |scale| f64::from(*scale))
+    }
+
     /// Memory that it takes beside the scene and the mesh, bytes.
     pub fn bytes(&self) -> usize {
         self.tree.memory()

@@ -96,7 +96,7 @@ pub fn illuminance(report: &Report) -> String {
         }
     };
     body += &note(&format!(
-        "Illuminance in lux is the light that arrives on a surface, on both sides of two-sided ones, by elements {} wide. \
+        "Illuminance in lux is the light that arrives on a surface, on both sides of two-sided ones, by elements up to {} wide. \
          Extremes depend on their size, the mean hardly does.{dark}{referee}",
         with_unit(report.solution.element_size, "m"),
     ));

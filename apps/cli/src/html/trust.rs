@@ -98,7 +98,7 @@ pub fn solution(report: &Report) -> String {
     let row = |name: &str, meaning: &str, values: &[f64]| [&[named(name, meaning)][..], &bands(values)].concat();
     let partly = if s.partly_buried > 0 { format!("; {} more in part", count(s.partly_buried)) } else { String::new() };
     let buried = format!("{}{partly}", figures::BURIED);
-    let elements = format!("{}, {} wide", figures::ELEMENTS, with_unit(s.element_size, "m"));
+    let elements = format!("{}, up to {} wide", figures::ELEMENTS, with_unit(s.element_size, "m"));
     let cards = cards(&[
         ("Raw closure", number(s.raw_closure), figures::CLOSURE),
         ("Elements", count(s.elements), &elements),

@@ -515,7 +515,7 @@ impl<'a> Solution<'a> {
     /// How many times its area a triangle counts: places of a smaller scale as if they were as wide as the rest. A flat on a wide site is
     /// a thousandth of its area, and what matters to who is in it.
     pub(crate) fn counts(&self, triangle: usize) -> f64 {
-        self.tracer.scales().get(triangle).map_or(1.0, |scale| f64::from(*scale).powi(-2))
+        self.tracer.scale(triangle).powi(-2)
     }
 
     /// Raw closure: the largest difference of a row of F from the sum one, over all ids, as the table answers it; with a

@@ -172,7 +172,5 @@ pub(crate) fn cell_width<'a>(tracer: &'a Tracer, options: &SolveOptions) -> Cell
 
 /// Area that each triangle would have were all places of one scale, m².
 pub(crate) fn scaled_area(tracer: &Tracer) -> f64 {
-    let (mesh, scales) = (tracer.mesh, tracer.scales());
-    let scaled = |(t, scale): (usize, &f32)| mesh.area(t) * f64::from(*scale).powi(-2);
-    if scales.is_empty() { mesh.whole_area() } else { scales.iter().enumerate().map(scaled).sum() }
+    (0..tracer.mesh.triangles.len()).map(|t| tracer.mesh.area(t) / tracer.scale(t).powi(2)).sum()
 }
