@@ -494,7 +494,8 @@ fn certify_unless(
             let again = stages.of("audit") + start.elapsed().as_secs_f64();
             let before = f64::from(auditor.paths());
             let paths = ((audit.growth(target) * before).ceil() as u32).min(most_paths);
-            let is_enough = target >= audit.upper || paths <= auditor.paths();
+            let is_in_vain = !audit.is_of_paths() && auditor.paths() >= least;
+            let is_enough = target >= audit.upper || is_in_vain || paths <= auditor.paths();
             if is_enough || !unsure || !has_time(monitor, (f64::from(paths) / before - 1.0) * again) {
                 return Ok(audit);
             }

@@ -33,6 +33,9 @@ const LEAST_GROWTH: f64 = 1.5;
 const MOST_GROWTH: f64 = 2.0;
 const TO_SPARE: f64 = 1.1;
 
+/// Least part of the noise of the squared error that has to be of paths for more of them to be worth their while.
+const WORTH: f64 = 0.1;
+
 /// Fewest and most paths of a place, relative to `paths`, as powers of two: a sixteenth of the mean light and less, 256 times as much and more. Without a
 /// most, the few places beside a lamp would take all the time.
 const DOUBLINGS: [i32; 2] = [-2, 4];
@@ -58,6 +61,8 @@ pub struct Audit {
     pub bias: f64,
     /// Standard error of `bias`.
     pub bias_error: f64,
+    /// Part of the variance of the squared error that is of paths, and falls with more of them; the rest is of which places there are.
+    pub of_paths: f64,
     /// Mean illuminance at the points by the referee, lux.
     pub mean_illuminance: f64,
     /// Further places at which what is handed out was compared with the answer that it was read from.
@@ -71,6 +76,11 @@ impl Audit {
         let square = |x: f64| x * x;
         let deviation = (square(self.upper) - square(self.error)) / ONE_SIDED_95;
         square(self.error) - CERTAIN * deviation > square(target)
+    }
+
+    /// Whether more paths would make it surer; if not, other places may.
+    pub fn is_of_paths(&self) -> bool {
+        self.of_paths >= WORTH
     }
 
     /// How many times the paths are to be there to bring the bound to `target`, if the error's estimate stays where it is: what the paths
@@ -266,7 +276,7 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         // Where the referee finds no light at all, no light is right and any other answer infinitely wrong.
         let is_dark = m.iter().all(|m| luminance(*m) == 0.0);
         let error = if is_dark { 0.0 } else { f64::INFINITY };
-        return Audit { points, paths, error, upper: error, ..Audit::default() };
+        return Audit { points, paths, error, upper: error, of_paths: 1.0, ..Audit::default() };
     }
     if m.iter().flatten().any(|e| !e.is_finite()) {
         return Audit { points, paths, error: f64::INFINITY, upper: f64::INFINITY, ..Audit::default() };
@@ -284,6 +294,7 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         let growing = 4.0 * places.iter().map(|p| p.shift[1]).fold(0.0, f64::max) / n;
         (Noise { fixed: mean(&|p| p.noise) / n, growing }, mean(&|p| p.shift[1]) / n)
     };
+    let of_places = if looks == 2 { (noise.fixed - mean(&|p| p.noise) / n).max(0.0) } else { 0.0 };
     let squares = from.map_or(&[][..], |(_, squares)| squares);
     let count = squares.len() as f64;
     let [apart, known] = [0, 1].map(|k| squares.iter().map(|s| s[k]).sum::<f64>() / count.max(1.0));
@@ -293,6 +304,7 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
     noise.fixed += spread;
     let level = mean(&|p| p.level).max(f64::MIN_POSITIVE);
     let root = |x: f64| (x.max(0.0) / square).sqrt();
+    let of_paths = 1.0 - (of_places + spread) / noise.at(squared_error).powi(2).max(f64::MIN_POSITIVE);
     // A handful of products says nothing of their spread: no bound is better than a false one.
     let is_handful = estimates.len() < 2 * FEWEST_PAIRS;
     Audit {
@@ -303,6 +315,7 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         lower: if is_handful { 0.0 } else { root(squared_error - ONE_SIDED_95 * noise.at(squared_error)) },
         bias: mean(&|p| p.shift[0]) / level,
         bias_error: shifted.sqrt() / level,
+        of_paths,
         mean_illuminance: level,
         compared: squares.len(),
     }
@@ -360,6 +373,22 @@ mod tests {
                 assert!(held >= 1870, "{points} points, {share} off, at one: {is_one}: {held} of 2,000");
             }
         }
+    }
+
+    /// Where both estimates of a place say that it alone is wrong, other places tell more than paths; where they differ, paths do, and what more places say
+    /// of light read back is of places.
+    #[test]
+    fn noise_is_of_paths_or_of_places() {
+        let audit = |alone: [f64; 2], noise: f64, squares: &[[f64; 2]]| {
+            let mut estimates: Vec<f64> = (0..1000).map(|k| 1.0 + if k % 3 == 0 { noise } else { -0.5 * noise }).collect();
+            estimates[..2].copy_from_slice(&alone);
+            let m = [[1.0; 3]; 500];
+            judge((&estimates, 2), &m, Some((&m, squares)), 1)
+        };
+        assert!(!audit([3.0, 3.01], 0.01, &[]).is_of_paths());
+        assert!(audit([1.0, 1.0], 0.1, &[]).is_of_paths() && audit([3.0, 0.5], 0.01, &[]).is_of_paths());
+        let few_are_off: Vec<[f64; 2]> = (0..100).map(|k| [if k < 2 { 1.0 } else { 0.0 }, 1.0]).collect();
+        assert!(!audit([1.0, 1.0], 0.1, &few_are_off).is_of_paths());
     }
 
     /// As many more paths as bring the bound to the target by what is known, half as many at least, and twice as many where nothing would.
