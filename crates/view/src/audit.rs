@@ -380,7 +380,8 @@ mod tests {
     #[test]
     fn noise_is_of_paths_or_of_places() {
         let audit = |alone: [f64; 2], noise: f64, squares: &[[f64; 2]]| {
-            let mut estimates: Vec<f64> = (0..1000).map(|k| 1.0 + if k % 3 == 0 { noise } else { -0.5 * noise }).collect();
+            let mut estimates: Vec<f64> =
+                (0..1000).map(|k| 1.0 + if k % 3 == 0 { noise } else { -0.5 * noise }).collect();
             estimates[..2].copy_from_slice(&alone);
             let m = [[1.0; 3]; 500];
             judge((&estimates, 2), &m, Some((&m, squares)), 1)
