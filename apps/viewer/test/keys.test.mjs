@@ -101,7 +101,7 @@ test('everything is reached by keyboard alone', slow, async () => {
   await page.context().close();
 });
 
-test('groups, menus and lists are as keyboards expect them, and keys of one letter can be switched off', async () => {
+test('groups, menus and lists are as keyboards expect them, and keys of one letter can be switched off', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const focused = () => page.evaluate(() => document.activeElement.textContent);

@@ -748,7 +748,7 @@ test('what is written into a number that changed under the cursor replaces it', 
   await page.context().close();
 });
 
-test('a decimal comma is a point, typed and pasted, and arrows go on from it', async () => {
+test('a decimal comma is a point, typed and pasted, and arrows go on from it', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   await page.evaluate(() => {
@@ -985,7 +985,7 @@ test('the error of what is in sight is told, and that of each place in percent o
   await page.context().close();
 });
 
-test('light is shown by the tone curve that is chosen, which is kept', async () => {
+test('light is shown by the tone curve that is chosen, which is kept', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   await page.evaluate(() => window.radiosity.app.exposure.set(-5));

@@ -58,18 +58,18 @@ fn a_camera_that_is_placed_is_told() {
     let room = Room::new("placed");
     room.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let call = ["render", "a.obj", "-o", "a.png", "--error", "50%", "--rounds", "0", "--sky", "uniform:300"];
-    let run = room.run(call);
+    let run = room.run(call.iter().chain(&["--size", "96x96"]));
     // Width and height in the first chunk of a PNG.
     let size = || room.read("a.png")[16..24].to_owned();
     let first = size();
     let told = run.err.lines().find_map(|line| line.split_once("for this scene is ")).expect("a note").1.to_owned();
     assert!(run.err.contains("--up z"), "{run:?}");
     let words: Vec<&str> = told.split(' ').collect();
-    let ["--eye", eye, "--target", target, "--fov", fov, "--size", _] = words[..] else { panic!("{told}") };
+    let ["--eye", eye, "--target", target, "--fov", fov, "--size", "96x96"] = words[..] else { panic!("{told}") };
 
     let scene = radiosity::io::load(&room.path("a.obj"), &Default::default()).unwrap().scene;
     let mesh = radiosity::Mesh::new(&scene);
-    let camera = radiosity::place_camera(&radiosity::Tracer::new(&scene, &mesh), None);
+    let camera = radiosity::place_camera(&radiosity::Tracer::new(&scene, &mesh), Some(1.0));
     let place = |text: &str| text.split(',').map(|x| x.parse::<f64>().unwrap()).collect::<Vec<_>>();
     let (eye, target) = (place(eye), place(target));
     for axis in 0..3 {

@@ -62,11 +62,11 @@ fn catalogue_42_the_display_is_as_near_as_asked() {
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
         let size = if mesh.triangles.len() > 30 { 0.5 } else { 3.0 };
-        let plain = SolveOptions { element_size: Some(size), rays: 32, ..SolveOptions::default() };
+        let plain = SolveOptions { element_size: Some(size), rays: 8, ..SolveOptions::default() };
         let tight = Params { tolerance: 2e-6, ..plain.params };
         let exact = Solution::new(&tracer, &SolveOptions { params: tight, ..plain }, &()).unwrap();
         for solver in SOLVERS {
-            let coarse = SolveOptions { element_size: Some(size), rays: 32, ..SolveOptions::of(solver) };
+            let coarse = SolveOptions { element_size: Some(size), rays: 8, ..SolveOptions::of(solver) };
             let mut work = 0.0;
             for (asked, exposure) in [(20.0, None), (3.0, None), (3.0, Some(-5.0)), (0.3, None)] {
                 let options = SolveOptions { displayed: Some(Displayed { delta_e: asked, exposure }), ..coarse };
