@@ -130,7 +130,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         progress.say(&warning);
     }
     let levels = Levels::of(measured.irradiance.iter().map(|e| luminance(*e)));
-    let error = ErrorReport::new((&measured.audit, &measured.audit), &arguments.solve, measured.out_of_time);
+    let audit = &measured.audit;
+    let error = ErrorReport::new((audit, audit), &measured.rounds, &arguments.solve, measured.out_of_time);
     progress.overtime().iter().for_each(|note| progress.say(note));
     if global.json {
         let values: Option<&[radiosity::Bands]> = arguments.output.is_none().then_some(&measured.irradiance);

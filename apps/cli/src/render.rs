@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     outputs.commit()?;
 
     let is_over = baked.out_of_time || view.is_hurried || progress.is_over();
-    let mut error = ErrorReport::new((&audit, &baked.audit), &arguments.solve, is_over);
+    let mut error = ErrorReport::new((&audit, &baked.audit), &baked.rounds, &arguments.solve, is_over);
     if error.is_lost_in_writing() && error.upper_95_one_sided.is_finite() {
         let closer = error.asked * error.asked / error.upper_95_one_sided;
         error.finer = match (is_over, closer < numbers::LEAST_ERROR) {

@@ -3,7 +3,7 @@
 use crate::illuminance::Illuminance;
 use crate::progress::Progress;
 use crate::{Failure, faults, figures, input};
-use radiosity::measure::Round;
+use radiosity::measure::{Round, is_stalled};
 use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Scene, Shown, Sky, View, WrittenRound, counted};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -75,6 +75,8 @@ pub struct ErrorReport {
     pub achieved: bool,
     /// Whether it does not because --time was over.
     pub out_of_time: bool,
+    /// Whether it does not though more rounds were allowed: the last ones brought next to nothing.
+    pub stalled: bool,
     /// The audit's estimate.
     pub estimated: f64,
     /// One-sided 95 % bound from above; infinite (in JSON: null) where there is none.
@@ -102,13 +104,19 @@ pub struct ErrorReport {
 }
 
 impl ErrorReport {
-    /// Of an audit of what is handed out, one of the solution that it was read from, and what was asked; and whether time
-    /// was over.
-    pub fn new((audit, solution): (&Audit, &Audit), solve: &input::SolveArguments, is_over: bool) -> ErrorReport {
+    /// Of an audit of what is handed out, one of the solution that it was read from after some rounds, and what was asked; and whether
+    /// time was over.
+    pub fn new(
+        (audit, solution): (&Audit, &Audit),
+        rounds: &[Round],
+        solve: &input::SolveArguments,
+        is_over: bool,
+    ) -> ErrorReport {
         ErrorReport {
             asked: solve.error,
             achieved: audit.upper <= solve.error,
             out_of_time: is_over && audit.upper > solve.error,
+            stalled: audit.upper > solve.error && is_stalled(rounds),
             estimated: audit.error,
             upper_95_one_sided: audit.upper,
             lower_95_one_sided: audit.lower,
@@ -153,6 +161,7 @@ impl ErrorReport {
             (true, _) => "reached",
             (false, true) => "NOT reached in the time given",
             (false, false) if self.is_lost_in_writing() || self.upper_95_one_sided.is_infinite() => "NOT reached",
+            (false, false) if self.stalled => "NOT reached (the last rounds came no nearer: more would hardly help)",
             (false, false) => "NOT reached (allow more --rounds, more --memory or, if given, a smaller --element-size)",
         };
         let bound = match self.upper_95_one_sided {
@@ -327,6 +336,7 @@ impl Report {
                 finer,
                 ..ErrorReport::new(
                     (written, &baked.audit),
+                    &baked.rounds,
                     solve,
                     baked.out_of_time || is_hurried || progress.is_over(),
                 )
@@ -413,32 +423,33 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// An audit that sees nothing but its own noise does not say that there is no error.
+    /// An audit that sees nothing but its own noise does not say that there is no error; and what would not help is no advice.
     #[test]
     fn an_error_that_is_not_seen_is_not_none() {
-        let line = |estimated: f64| {
-            ErrorReport {
-                asked: 0.05,
-                achieved: true,
-                out_of_time: false,
-                estimated,
-                upper_95_one_sided: 0.02,
-                lower_95_one_sided: 0.0,
-                bias: 0.0,
-                bias_standard_error: 0.0,
-                points: 100,
-                paths_per_estimate: 48,
-                mean_illuminance: 10.0,
-                seed: 1,
-                solution_estimated: estimated,
-                solution_upper_95_one_sided: 0.02,
-                finer: String::new(),
-            }
-            .line()
+        let report = |estimated: f64| ErrorReport {
+            asked: 0.05,
+            achieved: true,
+            out_of_time: false,
+            stalled: false,
+            estimated,
+            upper_95_one_sided: 0.02,
+            lower_95_one_sided: 0.0,
+            bias: 0.0,
+            bias_standard_error: 0.0,
+            points: 100,
+            paths_per_estimate: 48,
+            mean_illuminance: 10.0,
+            seed: 1,
+            solution_estimated: estimated,
+            solution_upper_95_one_sided: 0.02,
+            finer: String::new(),
         };
-        let [unseen, seen] = [0.0, 0.01].map(line);
+        let [unseen, seen] = [0.0, 0.01].map(|estimated| report(estimated).line());
         assert!(unseen.contains("reached; audit cannot tell the answer from the truth, at most 2.000 %"), "{unseen}");
         assert!(seen.contains("reached; audit says 1.000 %, at most 2.000 %"), "{seen}");
+        let missed = |stalled| ErrorReport { asked: 0.01, achieved: false, stalled, ..report(0.015) }.line();
+        assert!(missed(false).contains("NOT reached (allow more --rounds"), "{}", missed(false));
+        assert!(missed(true).contains("NOT reached (the last rounds came no nearer: "), "{}", missed(true));
     }
 
     #[test]

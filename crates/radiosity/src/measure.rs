@@ -430,7 +430,7 @@ fn root_mean_square(irradiance: &[Bands]) -> f64 {
 const STALLED: f64 = 0.9;
 
 /// Whether the last two rounds brought next to nothing.
-pub(crate) fn is_stalled(rounds: &[Round]) -> bool {
+pub fn is_stalled(rounds: &[Round]) -> bool {
     brought_nothing(&rounds.iter().map(|round| round.error).collect::<Vec<_>>())
 }
 

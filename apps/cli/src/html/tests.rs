@@ -38,6 +38,7 @@ fn example(rounds: usize) -> Report {
             asked: 0.01,
             achieved: upper <= 0.01,
             out_of_time: false,
+            stalled: false,
             estimated,
             upper_95_one_sided: upper,
             lower_95_one_sided: 0.8 * estimated,
