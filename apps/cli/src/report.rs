@@ -77,6 +77,8 @@ pub struct ErrorReport {
     pub out_of_time: bool,
     /// Whether it does not though more rounds were allowed: the last ones brought next to nothing.
     pub stalled: bool,
+    /// Whether the noise of the audit's own paths leaves open whether it is met, and would for any answer: it alone comes to more.
+    pub left_open: bool,
     /// The audit's estimate.
     pub estimated: f64,
     /// One-sided 95 % bound from above; infinite (in JSON: null) where there is none.
@@ -112,11 +114,13 @@ impl ErrorReport {
         solve: &input::SolveArguments,
         is_over: bool,
     ) -> ErrorReport {
+        let noise = (audit.upper.powi(2) - audit.error.powi(2)).sqrt();
         ErrorReport {
             asked: solve.error,
             achieved: audit.upper <= solve.error,
             out_of_time: is_over && audit.upper > solve.error,
             stalled: audit.upper > solve.error && is_stalled(rounds),
+            left_open: audit.lower <= solve.error && noise > solve.error && audit.is_of_paths(),
             estimated: audit.error,
             upper_95_one_sided: audit.upper,
             lower_95_one_sided: audit.lower,
@@ -161,6 +165,9 @@ impl ErrorReport {
             (true, _) => "reached",
             (false, true) => "NOT reached in the time given",
             (false, false) if self.is_lost_in_writing() || self.upper_95_one_sided.is_infinite() => "NOT reached",
+            (false, false) if self.left_open => {
+                "NOT reached for certain (light comes by few bright paths, and those of the audit leave it open)"
+            }
             (false, false) if self.stalled => "NOT reached (the last rounds came no nearer: more would hardly help)",
             (false, false) => "NOT reached (allow more --rounds, more --memory or, if given, a smaller --element-size)",
         };
@@ -431,6 +438,7 @@ mod tests {
             achieved: true,
             out_of_time: false,
             stalled: false,
+            left_open: false,
             estimated,
             upper_95_one_sided: 0.02,
             lower_95_one_sided: 0.0,
@@ -447,9 +455,13 @@ mod tests {
         let [unseen, seen] = [0.0, 0.01].map(|estimated| report(estimated).line());
         assert!(unseen.contains("reached; audit cannot tell the answer from the truth, at most 2.000 %"), "{unseen}");
         assert!(seen.contains("reached; audit says 1.000 %, at most 2.000 %"), "{seen}");
-        let missed = |stalled| ErrorReport { asked: 0.01, achieved: false, stalled, ..report(0.015) }.line();
-        assert!(missed(false).contains("NOT reached (allow more --rounds"), "{}", missed(false));
-        assert!(missed(true).contains("NOT reached (the last rounds came no nearer: "), "{}", missed(true));
+        let missed = |[stalled, left_open]: [bool; 2]| {
+            ErrorReport { asked: 0.01, achieved: false, stalled, left_open, ..report(0.015) }.line()
+        };
+        let [by_rounds, in_vain, open] = [[false, false], [true, false], [true, true]].map(missed);
+        assert!(by_rounds.contains("NOT reached (allow more --rounds"), "{by_rounds}");
+        assert!(in_vain.contains("NOT reached (the last rounds came no nearer: "), "{in_vain}");
+        assert!(open.contains("NOT reached for certain (light comes by few bright paths"), "{open}");
     }
 
     #[test]

@@ -117,6 +117,11 @@ fn verdict(report: &Report) -> String {
         format!("; {} was asked. The solution itself is within {within}: {}.", percent(asked), error.finer)
     } else if error.out_of_time {
         format!("; {} was asked. Allow more time.", percent(asked))
+    } else if error.left_open {
+        format!(
+            "; {} was asked. Light comes by few bright paths, and those of the audit leave open whether it is reached.",
+            percent(asked)
+        )
     } else if error.stalled {
         format!("; {} was asked. The last rounds came no nearer: more would hardly help.", percent(asked))
     } else if bounded && error.estimated <= asked {

@@ -39,6 +39,7 @@ fn example(rounds: usize) -> Report {
             achieved: upper <= 0.01,
             out_of_time: false,
             stalled: false,
+            left_open: false,
             estimated,
             upper_95_one_sided: upper,
             lower_95_one_sided: 0.8 * estimated,
