@@ -181,7 +181,8 @@ pub(crate) fn indirect(
         Some(left) => Timed::new(monitor, Duration::from_secs_f64(part * left)),
         None => Timed::unlimited(monitor),
     };
-    let mut gathered = blocks.gathered(baked, stations, false, &own)?;
+    let (seconds, gathered) = pace::timed(|| blocks.gathered(baked, stations, false, &own));
+    let mut gathered = gathered?;
     let mut is_whole = gathered.as_ref().map_or(blocks.blocks.is_empty(), |gathered| gathered.is_whole);
     for wider in WIDER {
         if gathered.is_some() || blocks.blocks.is_empty() {
@@ -199,9 +200,12 @@ pub(crate) fn indirect(
             looks[solution.elements.cell(element)] += 1;
         }
     }
+    // A deadline has to leave as much time again: the rest of the picture needs it more.
     let closer = match &gathered {
-        Some(gathered) => blocks.closer(solution, gathered),
-        None => Blocks::of(view, vec![false; stations.len()], 1, 0),
+        Some(gathered) if pace::left(&own).is_none_or(|left| pace::suffices(left, seconds)) => {
+            blocks.closer(solution, gathered)
+        }
+        _ => Blocks::of(view, vec![false; stations.len()], 1, 0),
     };
     let closely = closer.gathered(baked, stations, false, &own)?;
     is_whole &= closely.as_ref().map_or(closer.blocks.is_empty(), |gathered| gathered.is_whole);
