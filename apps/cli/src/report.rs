@@ -75,9 +75,9 @@ pub struct ErrorReport {
     pub achieved: bool,
     /// Whether it does not because --time was over.
     pub out_of_time: bool,
-    /// Whether it does not though more rounds were allowed: the last ones brought next to nothing.
+    /// Whether it does not, the last rounds brought next to nothing, and elements were as small as the program has them.
     pub stalled: bool,
-    /// Whether the noise of the audit's own paths leaves open whether it is met, and would for any answer: it alone comes to more.
+    /// Whether the noise of the audit's own paths leaves open whether it is met, and would of any answer.
     pub left_open: bool,
     /// The audit's estimate.
     pub estimated: f64,
@@ -114,13 +114,12 @@ impl ErrorReport {
         solve: &input::SolveArguments,
         is_over: bool,
     ) -> ErrorReport {
-        let noise = (audit.upper.powi(2) - audit.error.powi(2)).sqrt();
         ErrorReport {
             asked: solve.error,
             achieved: audit.upper <= solve.error,
             out_of_time: is_over && audit.upper > solve.error,
-            stalled: audit.upper > solve.error && is_stalled(rounds),
-            left_open: audit.lower <= solve.error && noise > solve.error && audit.is_of_paths(),
+            stalled: audit.upper > solve.error && is_stalled(rounds) && solve.element_size.is_none(),
+            left_open: audit.is_left_open(solve.error),
             estimated: audit.error,
             upper_95_one_sided: audit.upper,
             lower_95_one_sided: audit.lower,
@@ -430,10 +429,9 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// An audit that sees nothing but its own noise does not say that there is no error; and what would not help is no advice.
-    #[test]
-    fn an_error_that_is_not_seen_is_not_none() {
-        let report = |estimated: f64| ErrorReport {
+    /// An estimate of 5 % that were asked.
+    fn report(estimated: f64) -> ErrorReport {
+        ErrorReport {
             asked: 0.05,
             achieved: true,
             out_of_time: false,
@@ -451,10 +449,20 @@ mod tests {
             solution_estimated: estimated,
             solution_upper_95_one_sided: 0.02,
             finer: String::new(),
-        };
+        }
+    }
+
+    /// An audit that sees nothing but its own noise does not say that there is no error.
+    #[test]
+    fn an_error_that_is_not_seen_is_not_none() {
         let [unseen, seen] = [0.0, 0.01].map(|estimated| report(estimated).line());
         assert!(unseen.contains("reached; audit cannot tell the answer from the truth, at most 2.000 %"), "{unseen}");
         assert!(seen.contains("reached; audit says 1.000 %, at most 2.000 %"), "{seen}");
+    }
+
+    /// What would not help is no advice.
+    #[test]
+    fn rounds_are_advised_where_they_may_help() {
         let missed = |[stalled, left_open]: [bool; 2]| {
             ErrorReport { asked: 0.01, achieved: false, stalled, left_open, ..report(0.015) }.line()
         };

@@ -65,9 +65,11 @@ const STEPS: u32 = 4;
 /// Within a time limit a step is worth its while from so many times as many rays on.
 const WORTH: f64 = 1.1;
 
-/// Light that is by so much of all light unlike that of a block around, and by so many standard errors, is not interpolated: every pixel there gathers.
-/// With 0.1 a bright slit is as near (0.81 instead of 0.87 % off, 1.26 where all is interpolated), and twice as many pixels of the Cornell box gather; with 0.3 it is 1.10 % off.
+/// Light that is by so much of all light unlike that of a block around is steep, and not interpolated: every pixel there gathers. With 0.1 a bright
+/// slit is as near (0.81 instead of 0.87 % off, 1.26 where all is interpolated), and twice as many pixels of the Cornell box gather; with 0.3 it is 1.10 % off.
 const STEEP: f32 = 0.15;
+
+/// And by so many standard errors of the difference, or every pixel would gather where there is nothing but noise. Others were not tried.
 const CLEAR: f32 = 3.0;
 
 /// Squares around a block, to each side, in which others of its surface are looked for.
@@ -181,8 +183,11 @@ pub(crate) fn indirect(
         Some(left) => Timed::new(monitor, Duration::from_secs_f64(part * left)),
         None => Timed::unlimited(monitor),
     };
-    let (seconds, gathered) = pace::timed(|| blocks.gathered(baked, stations, false, &own));
-    let mut gathered = gathered?;
+    let timed = |blocks: &Blocks, is_least: bool| {
+        let (seconds, gathered) = pace::timed(|| blocks.gathered(baked, stations, is_least, &own));
+        gathered.map(|gathered| (seconds, gathered))
+    };
+    let (mut seconds, mut gathered) = timed(&blocks, false)?;
     let mut is_whole = gathered.as_ref().map_or(blocks.blocks.is_empty(), |gathered| gathered.is_whole);
     for wider in WIDER {
         if gathered.is_some() || blocks.blocks.is_empty() {
@@ -190,8 +195,16 @@ pub(crate) fn indirect(
         }
         blocks = Blocks::new(solution, view, stations, wider);
         let is_least = solution.options.looked_up && wider == WIDER[WIDER.len() - 1];
-        gathered = blocks.gathered(baked, stations, is_least, &own)?;
+        (seconds, gathered) = timed(&blocks, is_least)?;
     }
+    let closer = gathered.as_ref().and_then(|gathered| blocks.closer(solution, gathered));
+    // A deadline has to leave as much time again: the rest of the picture needs it more.
+    let has_time = pace::left(&own).is_none_or(|left| pace::suffices(left, seconds));
+    let closely = match &closer {
+        Some(closer) if has_time => closer.gathered(baked, stations, false, &own)?,
+        _ => None,
+    };
+    is_whole &= closer.is_none() || closely.as_ref().is_some_and(|gathered| gathered.is_whole);
     // Elements that are only looked up make no field that is worth a look.
     let is_shown = |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.gathers[place]);
     let mut looks = vec![0; solution.elements.cells()];
@@ -200,15 +213,6 @@ pub(crate) fn indirect(
             looks[solution.elements.cell(element)] += 1;
         }
     }
-    // A deadline has to leave as much time again: the rest of the picture needs it more.
-    let closer = match &gathered {
-        Some(gathered) if pace::left(&own).is_none_or(|left| pace::suffices(left, seconds)) => {
-            blocks.closer(solution, gathered)
-        }
-        _ => Blocks::of(view, vec![false; stations.len()], 1, 0),
-    };
-    let closely = closer.gathered(baked, stations, false, &own)?;
-    is_whole &= closely.as_ref().map_or(closer.blocks.is_empty(), |gathered| gathered.is_whole);
     let mut light = vec![[0.0; 3]; stations.len()];
     if looks.iter().any(|looks| *looks > 0) {
         let field = solution.field_on(&looks, baked.received.clone(), baked.error, monitor)?;
@@ -226,14 +230,19 @@ pub(crate) fn indirect(
     let chosen = |blocks: &Blocks, light: &[Bands]| -> Vec<Bands> {
         blocks.blocks.iter().map(|block| light[block.chosen as usize]).collect()
     };
-    let closely = closely.map(|gathered| shown(&closer, gathered, &chosen(&closer, &light)));
+    let closely = closer.zip(closely).map(|(closer, gathered)| {
+        let found = shown(&closer, gathered, &chosen(&closer, &light));
+        (closer, found)
+    });
     if let Some(gathered) = gathered {
         let field = chosen(&blocks, &light);
         let found = shown(&blocks, gathered, &field);
         blocks.add(&found, &field, &mut light);
     }
-    for (block, found) in closer.blocks.iter().zip(closely.into_iter().flatten()) {
-        light[block.chosen as usize] = found;
+    if let Some((closer, found)) = closely {
+        for (block, found) in closer.blocks.iter().zip(found) {
+            block.places.iter().for_each(|place| light[*place as usize] = found);
+        }
     }
     Ok((light, is_whole))
 }
@@ -255,7 +264,7 @@ impl<'a> Blocks<'a> {
         Blocks::of(view, gathers, wider * (count / most).sqrt().ceil().max(1.0) as u32, SURFACES * most as usize)
     }
 
-    /// Those of places that gather, as wide and no more than `most`.
+    /// Those of places that gather, of so many pixels to a side, no more than `most`.
     fn of(view: &'a ViewRays, mut gathers: Vec<bool>, side: u32, most: usize) -> Blocks<'a> {
         let first = |row: u32| view.seen.partition_point(|seen| seen.pixel < row * view.width) as u32;
         let of_row = |row: u32| {
@@ -288,25 +297,34 @@ impl<'a> Blocks<'a> {
         Blocks { view, side, blocks, beside, gathers }
     }
 
-    /// Blocks of a pixel where what these gathered is steep.
-    fn closer(&self, solution: &Solution, gathered: &Gathered) -> Blocks<'a> {
-        let mut gathers = vec![false; self.gathers.len()];
-        if self.side > 1 {
-            let level = |own: usize| luminance(gathered.light[own]);
-            let is_steep = |own: usize| {
-                let direct = solution.element_at(&seen(self.view, self.blocks[own].chosen).place);
-                let all = level(own) + luminance(direct.map_or([0.0; 3], |e| solution.columns.mean(e as usize)));
-                self.beside[own].iter().map(|other| *other as usize).any(|other| {
-                    let noise = gathered.noise[own].hypot(gathered.noise[other]);
-                    (level(own) - level(other)).abs() > (STEEP * all).max(CLEAR * noise)
-                })
-            };
-            let steep: Vec<bool> = (0..self.blocks.len()).into_par_iter().map(is_steep).collect();
-            for (block, _) in self.blocks.iter().zip(steep).filter(|(_, steep)| *steep) {
-                block.places.iter().for_each(|place| gathers[*place as usize] = true);
-            }
+    /// Blocks of a pixel where what these gathered is steep, no more than there are of these, where it is steepest; nothing where it is nowhere.
+    fn closer(&self, solution: &Solution, gathered: &Gathered) -> Option<Blocks<'a>> {
+        if self.side == 1 {
+            return None;
         }
-        Blocks::of(self.view, gathers, 1, self.blocks.len())
+        let level = |own: usize| luminance(gathered.light[own]);
+        let steepness = |own: usize| {
+            let direct = solution.element_at(&seen(self.view, self.blocks[own].chosen).place);
+            let all = level(own) + luminance(direct.map_or([0.0; 3], |e| solution.columns.mean(e as usize)));
+            let to = |other: usize| {
+                let off = (level(own) - level(other)).abs();
+                let is_clear = off > CLEAR * gathered.noise[own].hypot(gathered.noise[other]);
+                if is_clear { off / all.max(f32::MIN_POSITIVE) } else { 0.0 }
+            };
+            self.beside[own].iter().map(|other| to(*other as usize)).fold(0.0, f32::max)
+        };
+        let steepness: Vec<f32> = (0..self.blocks.len()).into_par_iter().map(steepness).collect();
+        let mut steep: Vec<usize> = (0..self.blocks.len()).filter(|own| steepness[*own] > STEEP).collect();
+        steep.sort_by(|a, b| steepness[*b].total_cmp(&steepness[*a]).then(a.cmp(b)));
+        let mut gathers = vec![false; self.gathers.len()];
+        let mut left = self.blocks.len();
+        for own in &steep {
+            let places = &self.blocks[*own].places;
+            let Some(rest) = left.checked_sub(places.len()) else { break };
+            left = rest;
+            places.iter().for_each(|place| gathers[*place as usize] = true);
+        }
+        (!steep.is_empty()).then(|| Blocks::of(self.view, gathers, 1, self.blocks.len()))
     }
 
     /// Means over each block and those beside it.
@@ -383,10 +401,13 @@ impl<'a> Blocks<'a> {
         let wanted = self.wanted(baked, &places, &pooled);
         let none = vec![f64::INFINITY; at.len()];
         let mut is_whole = first == FIRST;
-        for step in 1..=STEPS {
+        let noise = |pooled: &[Pooled], found: &Found| -> Vec<f32> {
             // Two halves alone say little of a place that shares with none.
             let noise = |(pooled, noise): (&Pooled, &f32)| if pooled.own < 1.0 { pooled.spread } else { *noise };
-            let spread: Vec<f32> = pooled.iter().zip(&found.noise).map(noise).collect();
+            pooled.iter().zip(&found.noise).map(noise).collect()
+        };
+        for step in 1..=STEPS {
+            let spread = noise(&pooled, &found);
             if step > 1 && wanted.of(&spread) <= ENOUGH * wanted.noise {
                 break;
             }
@@ -425,7 +446,7 @@ impl<'a> Blocks<'a> {
         }
         // What paths find beyond what they look up may be less than nothing.
         let light = pooled.iter().map(|p| p.light.map(|e| e.max(0.0))).collect();
-        let noise = pooled.iter().map(|p| p.spread).collect();
+        let noise = noise(&pooled, &found);
         Ok(Some(Gathered { light, halves, noise, is_whole }))
     }
 
@@ -533,8 +554,7 @@ mod tests {
         let options = BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() };
         let baked = bake(&tracer, &options, &()).unwrap();
         let view = ViewRays::new(&tracer, &scene.cameras[0], 64, 64);
-        let stations: Vec<Station> =
-            view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
+        let stations = stations(&view);
         let (light, is_whole) = indirect(&baked, &view, &stations, &()).unwrap();
         assert!(is_whole);
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -558,7 +578,12 @@ mod tests {
         assert!(gathered < 0.55 * field && gathered < 0.05, "{gathered} instead of {field}");
     }
 
-    /// Pixels gather, each, where light falls from one block to another, unless that may be noise.
+    fn stations(view: &ViewRays) -> Vec<Station> {
+        view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect()
+    }
+
+    /// Pixels gather, each, where light falls from one block to another by more than a seventh, unless that may be noise; and not those of the top alone
+    /// where it is steep everywhere.
     #[test]
     fn pixels_gather_where_light_is_steep() {
         let scene = cornell_box();
@@ -567,24 +592,65 @@ mod tests {
         let solve = SolveOptions { element_size: Some(0.14), ..SolveOptions::default() };
         let solution = Solution::new(&tracer, &solve, &()).unwrap();
         let view = ViewRays::new(&tracer, &scene.cameras[0], 64, 64);
-        let stations: Vec<Station> =
-            view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
-        let blocks = Blocks::new(&solution, &view, &stations, 2);
-        let middle = |block: &Block| 32u32.abs_diff(2 * block.square[0] + 1);
-        let closer = |noise: f32| {
-            let left = |block: &Block| [if block.square[0] < 16 { 0.0 } else { 1e3 }; 3];
-            let light: Vec<Bands> = blocks.blocks.iter().map(left).collect();
+        let blocks = Blocks::new(&solution, &view, &stations(&view), 2);
+        let closer = |level: &dyn Fn(u32, [u32; 2]) -> f32, noise: f32| {
+            let light: Vec<Bands> = (0..).zip(&blocks.blocks).map(|(i, block)| [level(i, block.square); 3]).collect();
             let noise = vec![noise; light.len()];
-            blocks.closer(
-                &solution,
-                &Gathered { halves: light.iter().map(|e| [*e; 2]).collect(), light, noise, is_whole: true },
-            )
+            let halves = light.iter().map(|e| [*e; 2]).collect();
+            blocks.closer(&solution, &Gathered { light, halves, noise, is_whole: true })
         };
-        let steep = closer(0.0);
-        let near = blocks.blocks.iter().filter(|block| middle(block) < 2 * AROUND).map(|block| block.places.len());
-        assert!(near.sum::<usize>() >= steep.blocks.len() && steep.blocks.len() > 64 * 2 * AROUND as usize - 64);
-        assert!(steep.blocks.iter().all(|block| block.square[0].abs_diff(31) <= 2 * AROUND));
-        assert!(closer(500.0).blocks.is_empty());
+        // Far more than the direct light there.
+        let step = |by: f32| move |_, [x, _]: [u32; 2]| if x < 16 { 1e6 } else { 1e6 * (1.0 + by) };
+        let steep = closer(&step(0.2), 0.0).unwrap().blocks;
+        let reach = 16 - AROUND..16 + AROUND;
+        assert!((460..540).contains(&steep.len()), "{} of 8 columns", steep.len());
+        assert!(steep.iter().all(|block| reach.contains(&(block.square[0] / 2))));
+        assert!(closer(&step(0.1), 0.0).is_none() && closer(&step(0.2), 1e5).is_none());
+
+        let steep = closer(&|i, _| 1e6 * (1.0 + unit(hash(i))), 0.0).unwrap().blocks;
+        let row = steep.iter().map(|block| f64::from(block.square[1])).sum::<f64>() / steep.len() as f64;
+        assert!(steep.len() <= blocks.blocks.len() && 10 * steep.len() > 9 * blocks.blocks.len());
+        assert!((24.0..40.0).contains(&row), "{row}");
+    }
+
+    /// What every pixel gathers where light is steep is near to what many rays find there, and the same on any number of threads.
+    #[test]
+    fn steep_light_is_what_pixels_find() {
+        let scene = cornell_box();
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        // So little memory that blocks are two pixels wide.
+        let solve = SolveOptions { element_size: Some(0.14), memory: 30 << 20, ..SolveOptions::default() };
+        let options = BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() };
+        let baked = bake(&tracer, &options, &()).unwrap();
+        let view = ViewRays::new(&tracer, &scene.cameras[0], 128, 128);
+        let stations = stations(&view);
+        let (light, is_whole) = indirect(&baked, &view, &stations, &()).unwrap();
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert!(is_whole && one.install(|| indirect(&baked, &view, &stations, &())).unwrap().0 == light);
+
+        let blocks = Blocks::new(&baked.solution, &view, &stations, 1);
+        assert_eq!(blocks.side, 2);
+        let gathered = blocks.gathered(&baked, &stations, false, &()).unwrap().unwrap();
+        let closer = blocks.closer(&baked.solution, &gathered).unwrap();
+        // What lies between blocks, over the field that the picture has.
+        let at = |s: &Station| baked.field.at(s.place.triangle as usize, s.uv, s.side);
+        let mut between: Vec<Bands> = stations.iter().map(at).collect();
+        let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
+        blocks.add(&gathered.light, &field, &mut between);
+        let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();
+        let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
+        let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
+        let [mut off, mut all] = [0f32; 2];
+        for (i, truth) in some.iter().zip(&truth) {
+            let truth = luminance(mean(truth.light));
+            off += (luminance(light[*i]) - truth).powi(2);
+            all += truth.powi(2);
+        }
+        let is_own = |i: &&usize| (luminance(light[**i]) / luminance(between[**i]) - 1.0).abs() > 0.005;
+        let own = some.iter().filter(is_own).count();
+        assert!(some.len() > 500 && 10 * own > 7 * some.len(), "{own} of {}", some.len());
+        assert!((off / all).sqrt() < 0.05, "{}", (off / all).sqrt());
     }
 
     /// Places in rows of [`SIDE`], each beside those of the 24 around that there are.

@@ -458,7 +458,7 @@ fn is_hopeless(audit: &Audit, target: f64) -> bool {
     audit.lower > HOPELESS * target
 }
 
-/// Has the auditor `judge` an answer, spending the referee's paths until the answer meets the target or misses it for certain:
+/// Has the auditor `judge` an answer, spending the referee's paths until the answer meets the target, misses it for certain, or more of them would tell nothing:
 /// taking an estimate for the truth would refine for the noise of the referee.
 pub(crate) fn certify(
     auditor: &mut Auditor,

@@ -33,7 +33,8 @@ const LEAST_GROWTH: f64 = 1.5;
 const MOST_GROWTH: f64 = 2.0;
 const TO_SPARE: f64 = 1.1;
 
-/// Least part of the noise of the squared error that has to be of paths for more of them to be worth their while.
+/// Least part of the variance of the squared error that is of paths for more of them to be worth their while: where it is all gone, what the bound has above
+/// the estimate is a twentieth less.
 const WORTH: f64 = 0.1;
 
 /// Fewest and most paths of a place, relative to `paths`, as powers of two: a sixteenth of the mean light and less, 256 times as much and more. Without a
@@ -81,6 +82,13 @@ impl Audit {
     /// Whether more paths would make it surer; if not, other places may.
     pub fn is_of_paths(&self) -> bool {
         self.of_paths >= WORTH
+    }
+
+    /// Whether paths leave open whether an answer meets the `target`, and would of any: their noise alone comes to more.
+    pub fn is_left_open(&self, target: f64) -> bool {
+        let square = |x: f64| x * x;
+        let noise = (square(self.upper) - square(self.error)) * self.of_paths.max(0.0).sqrt();
+        self.upper.is_finite() && self.lower <= target && noise > square(target)
     }
 
     /// How many times the paths are to be there to bring the bound to `target`, if the error's estimate stays where it is: what the paths
@@ -294,7 +302,9 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         let growing = 4.0 * places.iter().map(|p| p.shift[1]).fold(0.0, f64::max) / n;
         (Noise { fixed: mean(&|p| p.noise) / n, growing }, mean(&|p| p.shift[1]) / n)
     };
-    let of_places = if looks == 2 { (noise.fixed - mean(&|p| p.noise) / n).max(0.0) } else { 0.0 };
+    // The mean of this product is 2 μ² σ² + σ⁴, of an error μ and noise σ of either estimate that is normal: the variance of the product of the two.
+    let of_pair = |p: &Judged| 4.0 * p.shift[1] * p.shift[0].powi(2);
+    let of_places = if looks == 2 { (noise.fixed - mean(&of_pair) / n).max(0.0) } else { 0.0 };
     let squares = from.map_or(&[][..], |(_, squares)| squares);
     let count = squares.len() as f64;
     let [apart, known] = [0, 1].map(|k| squares.iter().map(|s| s[k]).sum::<f64>() / count.max(1.0));
@@ -388,8 +398,27 @@ mod tests {
         };
         assert!(!audit([3.0, 3.01], 0.01, &[]).is_of_paths());
         assert!(audit([1.0, 1.0], 0.1, &[]).is_of_paths() && audit([3.0, 0.5], 0.01, &[]).is_of_paths());
+        // All are off by as much: of that paths alone make noise.
+        let shifted: Vec<f64> =
+            (0..1000).map(|k: u32| 1.1 + 0.01 * f64::from(k.wrapping_mul(2_654_435_769) >> 16) / 65_536.0).collect();
+        assert!(judge((&shifted, 2), &[[1.0; 3]; 500], None, 1).is_of_paths());
         let few_are_off: Vec<[f64; 2]> = (0..100).map(|k| [if k < 2 { 1.0 } else { 0.0 }, 1.0]).collect();
         assert!(!audit([1.0, 1.0], 0.1, &few_are_off).is_of_paths());
+    }
+
+    /// What paths leave open is neither known to be worse, nor open by the places alone.
+    #[test]
+    fn noise_of_paths_leaves_answers_open() {
+        let open = |lower: f64, upper: f64, of_paths: f64| {
+            Audit { error: 0.01, lower, upper, of_paths, ..Audit::default() }.is_left_open(0.02)
+        };
+        assert!(open(0.0, 0.05, 1.0) && open(0.0, 0.05, 0.2));
+        assert!(
+            !open(0.03, 0.05, 1.0)
+                && !open(0.0, 0.05, 0.01)
+                && !open(0.0, 0.021, 1.0)
+                && !open(0.0, f64::INFINITY, 1.0)
+        );
     }
 
     /// As many more paths as bring the bound to the target by what is known, half as many at least, and twice as many where nothing would.
