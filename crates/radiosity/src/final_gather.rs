@@ -633,11 +633,22 @@ mod tests {
         assert_eq!(blocks.side, 2);
         let gathered = blocks.gathered(&baked, &stations, false, &()).unwrap().unwrap();
         let closer = blocks.closer(&baked.solution, &gathered).unwrap();
-        // What lies between blocks, over the field that the picture has.
-        let at = |s: &Station| baked.field.at(s.place.triangle as usize, s.uv, s.side);
+        // What lies between blocks, over the field that the picture has: without pixels that gather all of it would be that.
+        let solution = &baked.solution;
+        assert!(!solution.options.looked_up);
+        let mut looks = vec![0; solution.elements.cells()];
+        for s in &stations {
+            let element = solution.elements.at(s.place.triangle, s.uv.x as f32, s.uv.y as f32, s.side).unwrap();
+            looks[solution.elements.cell(element)] += 1;
+        }
+        let field = solution.field_on(&looks, baked.received.clone(), baked.error, &()).unwrap();
+        let at = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
         let mut between: Vec<Bands> = stations.iter().map(at).collect();
         let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
-        blocks.add(&gathered.light, &field, &mut between);
+        let mut found = gathered.light;
+        blocks.unless_sure(&mut found, &field, &gathered.halves);
+        blocks.add(&found, &field, &mut between);
+        assert!((0..light.len()).all(|i| closer.gathers[i] || light[i] == between[i]));
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();
         let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
         let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
