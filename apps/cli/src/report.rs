@@ -429,7 +429,7 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// An estimate of 5 % that were asked.
+    /// What is reported of such an estimate where 5 % were asked.
     fn report(estimated: f64) -> ErrorReport {
         ErrorReport {
             asked: 0.05,
