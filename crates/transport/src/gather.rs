@@ -8,11 +8,11 @@
 use crate::glance::Glance;
 use crate::glow::{Glow, SOUGHT};
 use crate::parts::Parts;
-use crate::pilot::{AGAIN, Pilot};
+use crate::pilot::{AGAIN, Pilot, facing};
 use crate::rows::IdSpace;
 use crate::{Columns, Luminaires, Progress, Receivers, Site, Stopped};
-use glam::{DVec2, Vec3};
-use radiosity_scene::{Bands, Side, Surface, luminance};
+use glam::{DVec2, DVec3, Vec3};
+use radiosity_scene::{Bands, Curve, Side, Surface, luminance};
 use radiosity_trace::sampling::{EIGHT, Sequence, cosine_directions, frame, hash, unit};
 use radiosity_trace::{Fan, Found, Place, Ray, Tracer};
 use rayon::prelude::*;
@@ -75,7 +75,6 @@ impl<'a> Gather<'a> {
         rays: usize,
         progress: &dyn Progress,
     ) -> Result<Vec<[Bands; 2]>, Stopped> {
-        const CHUNK: usize = 64;
         let n = receivers.len();
         let half_rays = rays.div_ceil(2).max(1) as u32;
         let peak = self.values.iter().map(|[r, g, b, _]| luminance([*r, *g, *b])).fold(0.0, f32::max).into();
@@ -86,17 +85,15 @@ impl<'a> Gather<'a> {
             glow: Glow::new(self),
         };
         let done = AtomicUsize::new(0);
-        let mut means = vec![[[0f32; 3]; 2]; n];
-        means.par_chunks_mut(CHUNK).enumerate().try_for_each(|(chunk, means)| {
+        let order = in_groups(receivers);
+        let size = (GROUP / rays.max(1)).clamp(FEWEST, MOST);
+        let of_group = |group: &[u32]| -> Result<Vec<[Bands; 2]>, Stopped> {
             let mut pilot = Pilot::default();
-            pilot.begin(means.len(), 2 * half_rays, peak);
-            let own = |k: usize| {
-                let i = chunk * CHUNK + k;
-                receivers.site(i).map(|site| (receivers.seed(i), site))
-            };
+            pilot.begin(group.len(), 2 * half_rays, peak);
+            let own = |i: u32| receivers.site(i as usize).map(|site| (receivers.seed(i as usize), site));
             let (mut parts, mut volley) = (Parts::default(), Volley::default());
-            for k in 0..means.len() {
-                let Some((seed, site)) = own(k) else { continue };
+            for (k, i) in group.iter().enumerate() {
+                let Some((seed, site)) = own(*i) else { continue };
                 let (sequence, salt) = (Sequence::new(seed, GATHER), hash(seed));
                 let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
                 volley.aim(&sequence, 2 * half_rays);
@@ -120,20 +117,25 @@ impl<'a> Gather<'a> {
                     pilot.add(k, usize::from(index >= half_rays as usize), *point, light.map(|l| *share * l));
                 }
             }
-            for (k, mean) in means.iter_mut().enumerate() {
-                let Some((seed, site)) = own(k) else { continue };
+            let mut mean = |(k, i): (usize, &u32)| {
+                let Some((seed, site)) = own(*i) else { return Default::default() };
                 let (sequence, salt) = (Sequence::new(seed, AGAIN), hash(seed ^ AGAIN));
                 let only = site.point().map(|place| Hemisphere::new(self.tracer, &place));
-                *mean = pilot.mean(k, (&sequence, 0), |index, [u, v, x, y]| {
+                let mut mean = pilot.mean(k, (&sequence, 0), |index, [u, v, x, y]| {
                     let above = only.unwrap_or_else(|| Hemisphere::new(self.tracer, &site.place(x, y)));
                     caster.arriving(&above, &above.towards([u, v]), hash(salt ^ index), &mut parts)
                 });
                 let sought = caster.sought((&site, seed), half_rays, &mut parts);
                 (0..2).for_each(|half| (0..3).for_each(|band| mean[half][band] += sought[half][band]));
-            }
-            let so_far = done.fetch_add(means.len(), Ordering::Relaxed) + means.len();
-            progress.step(so_far, n).then_some(()).ok_or(Stopped)
-        })?;
+                mean
+            };
+            let means = group.iter().enumerate().map(&mut mean).collect();
+            let so_far = done.fetch_add(group.len(), Ordering::Relaxed) + group.len();
+            progress.step(so_far, n).then_some(means).ok_or(Stopped)
+        };
+        let found = order.par_chunks(size).map(of_group).collect::<Result<Vec<_>, Stopped>>()?;
+        let mut means = vec![Default::default(); n];
+        order.iter().zip(found.into_iter().flatten()).for_each(|(i, mean)| means[*i as usize] = mean);
         Ok(means)
     }
 
@@ -142,6 +144,24 @@ impl<'a> Gather<'a> {
         let near = self.area.iter().map(|area| near(*area) as f32).chain(std::iter::repeat(0.0));
         self.values.iter().zip(near).map(|([r, g, b, _], near)| [*r, *g, *b, near]).collect()
     }
+}
+
+/// First rays that a group of receivers sends, about, and how few and many of these there are: the group shares what rays found.
+const GROUP: usize = 1 << 13;
+const FEWEST: usize = 8;
+const MOST: usize = 256;
+
+/// Receivers in groups that lie side by side: by where they face, then along a curve.
+fn in_groups(receivers: &impl Receivers) -> Vec<u32> {
+    let site = |i: usize| receivers.site(i).map(|site| (facing(site.normal), site.middle()));
+    let sites: Vec<Option<([i8; 3], DVec3)>> = (0..receivers.len()).into_par_iter().map(site).collect();
+    let nothing = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let bounds = sites.iter().flatten().fold(nothing, |[low, high], (_, at)| [low.min(*at), high.max(*at)]);
+    let curve = Curve::new(bounds);
+    let mut order: Vec<u32> = (0..receivers.len() as u32).collect();
+    // Those of which nothing is exposed come first, and face nowhere.
+    order.par_sort_by_cached_key(|i| sites[*i as usize].map(|(facing, at)| (facing, curve.number(at))));
+    order
 }
 
 /// Cells along a side of the square whose rays are traced one after another.

@@ -60,6 +60,11 @@ impl Site {
         self.triangle
     }
 
+    /// The middle of it.
+    pub(crate) fn middle(&self) -> DVec3 {
+        self.origin + (self.edges[0] + self.edges[1]) / 3.0
+    }
+
     /// Its area, m².
     pub(crate) fn area(&self) -> f64 {
         0.5 * self.edges[0].cross(self.edges[1]).length()

@@ -143,6 +143,21 @@ impl<R: Receivers> Caster<'_, R> {
         }
     }
 
+    /// So many rays of receiver i, k there, that no row keeps: what they have of the sky goes to `pilot`.
+    fn look(&self, (i, from): (usize, u32), rays: u32, k: usize, pilot: &mut Pilot) {
+        let Some((site, near)) = self.site(i) else { return };
+        let (seed, frame) = (hash(self.receivers.seed(i) ^ from), frame(site.normal));
+        let sequence = Sequence::new(seed, LOOKS);
+        pilot.place(k, &site, rays);
+        for index in 0..rays {
+            let point = sequence.point(index);
+            let id = self.cast((&site, near), &frame, point, hash(hash(seed ^ LOOKS) ^ index));
+            if let Some(light) = self.light(id) {
+                pilot.add(k, usize::from(index >= rays / 2), [point[0], point[1]], light);
+            }
+        }
+    }
+
     /// Mean radiosity of the sky over the hemisphere of receiver i, k there, as two halves.
     fn daylight(&self, (i, from): (usize, u32), k: usize, pilot: &mut Pilot) -> [Bands; 2] {
         let Some((site, near)) = self.site(i) else { return Default::default() };
@@ -191,6 +206,14 @@ pub struct HitTable {
 
 /// The stream of sample points that rows use.
 const ROWS: u32 = 0x0100;
+
+/// The stream of those that look for the sky where rows have too few.
+const LOOKS: u32 = 0x0190;
+
+/// Rays to the sky over all elements where rows have fewer and it is not seen from everywhere, and the most of each: a narrow window
+/// lights all of a room, and what it gives is to be known to two parts in a hundred.
+const SKY_RAYS: usize = 400_000;
+const MOST_LOOKS: usize = 1024;
 
 /// Rows that are traced, and summed, by one thread at a time.
 const CHUNK: usize = 256;
@@ -283,6 +306,7 @@ impl HitTable {
         let mut daylight = vec![[[0f32; 3]; 2]; n];
         let brightest = sky.iter().map(|l| luminance(*l)).fold(0.0, f32::max).into();
         let caster = Caster { tracer, ids, sky, receivers, from_afar: self.from_afar };
+        let looks = (SKY_RAYS / n.max(1)).min(MOST_LOOKS).next_multiple_of(2);
         let chunks = block.writers(CHUNK).into_par_iter().zip(daylight.par_chunks_mut(CHUNK));
         chunks.try_for_each(|(mut writer, daylight)| -> Result<(), ExtendError> {
             let rows = writer.rows.clone();
@@ -299,6 +323,12 @@ impl HitTable {
             }
             writer.flush()?;
             if !sky.is_empty() {
+                if more < looks && !pilot.is_clear() {
+                    pilot.begin(rows.len(), looks as u32, brightest);
+                    rows.clone()
+                        .enumerate()
+                        .for_each(|(k, i)| caster.look((i, self.traced[i] / 2), looks as u32, k, &mut pilot));
+                }
                 for (k, (i, daylight)) in rows.clone().zip(daylight).enumerate() {
                     *daylight = caster.daylight((i, self.traced[i] / 2), k, &mut pilot);
                 }
@@ -569,6 +599,44 @@ mod tests {
         let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
         let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
         of(&tracer, &ids, &receivers, &area)
+    }
+
+    /// All that comes through a slit of a centimetre into a closed room is known to a seventh by rows of eight rays, few of which meet it: π L
+    /// times its area, and the same at all sizes of elements in the mean.
+    #[test]
+    fn few_rays_tell_what_a_slit_lets_in() {
+        let mut scene = Scene { sky: Sky::Uniform([1.0; 3]), ..Scene::default() };
+        scene.materials = vec![Material::default()];
+        let [x, y, z] = [DVec3::X * 4.0, DVec3::Y * 4.0, DVec3::Z * 3.0];
+        let slit = 0.01;
+        let mut quad = |name: &str, at: DVec3, along: DVec3, across: DVec3| {
+            scene.add_quad(name, 0, [at, at + along, at + along + across, at + across]);
+        };
+        quad("floor", DVec3::ZERO, x, y);
+        quad("ceiling", z, y, x * 0.5);
+        quad("ceiling", z + x * 0.5 + DVec3::X * slit, y, x * 0.5 - DVec3::X * slit);
+        for (at, along, across) in [(DVec3::ZERO, z, x), (y, x, z), (DVec3::ZERO, y, z), (x, z, y)] {
+            quad("wall", at, along, across);
+        }
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let exact = std::f64::consts::PI * slit * 4.0;
+        let sizes: Vec<f64> = (0..8).map(|k| 0.22 + 0.04 * f64::from(k)).collect();
+        let of_size = |size: &f64| {
+            let elements = Elements::new(&scene, &mesh, *size);
+            let ids = IdSpace { elements: &elements, sky: SkyPatches::new(&scene.sky, scene.up.direction()) };
+            let exposure = Exposure::default();
+            let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
+            let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
+            let mut table = HitTable::new(area.clone(), &ids);
+            table.extend(&tracer, (&ids, &ids.sky.radiosity(&scene.sky)), &receivers, 8, &()).unwrap();
+            let of = |(area, [a, b]): (&f64, &[Bands; 2])| area * f64::from(0.5 * (a[1] + b[1]));
+            area.iter().zip(table.daylight()).map(of).sum::<f64>() / exact
+        };
+        let found: Vec<f64> = sizes.iter().map(of_size).collect();
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        let off = (found.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / found.len() as f64).sqrt();
+        assert!(off < 0.15 && (mean - 1.0).abs() < 0.06, "{off} {mean} {found:?}");
     }
 
     /// Over its area the floor sees half of the sky, and its open half all of it.
