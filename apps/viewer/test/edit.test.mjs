@@ -43,7 +43,7 @@ const inStudio = (use) => folder(async (path) => {
   await lit.end();
 });
 
-test('a thing is dragged, and light follows while it is and as a batch solve has it', async () => {
+test('a thing is dragged, and light follows while it is and as a batch solve has it', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const block = await named(page, 'short block');
@@ -784,7 +784,7 @@ test('a box and a luminous panel are added, get other lengths and lumens, are ti
   await page.context().close();
 });
 
-test('a lamp that is added is clear of walls and in the picture, wherever one stands', async () => {
+test('a lamp that is added is clear of walls and in the picture, wherever one stands', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   for (const kind of ['point', 'spot']) {

@@ -7,7 +7,7 @@ import { caughtUp, decoded, done, pixels, pixelsOf, slow, state } from './progra
 
 const { program, pages } = await started();
 
-test('a view is kept, gone back to from elsewhere and on another page, and forgotten', async () => {
+test('a view is kept, gone back to from elsewhere and on another page, and forgotten', slow, async () => {
   const [one, two] = await Promise.all([pages.open(program.url), pages.open(program.url)]);
   await Promise.all([done(one), done(two)]);
   const cameras = (page) => page.locator('#cameras');

@@ -195,7 +195,7 @@ test('points of a grid beneath things are left out and counted', slow, async () 
   await page.context().close();
 });
 
-test('a working plane lies in the air of the room, as `measure` has it, and follows changes', async () => {
+test('a working plane lies in the air of the room, as `measure` has it, and follows changes', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   const plane = () => state(page).then(({ plane }) => plane);
@@ -660,7 +660,7 @@ test('what is said holds: numbers, messages, and that the connection is lost', a
   await page.context().close();
 });
 
-test('what is not as it was asked for is told until the next number, and is not shown', async () => {
+test('what is not as it was asked for is told until the next number, and is not shown', slow, async () => {
   const page = await pages.open(program.url);
   await done(page);
   await page.evaluate(() => {
