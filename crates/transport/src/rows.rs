@@ -161,8 +161,8 @@ impl<R: Receivers> Caster<'_, R> {
     /// Mean radiosity of the sky over the hemisphere of receiver i, k there, as two halves.
     fn daylight(&self, (i, from): (usize, u32), k: usize, pilot: &mut Pilot) -> [Bands; 2] {
         let Some((site, near)) = self.site(i) else { return Default::default() };
-        let (seed, frame) = (self.receivers.seed(i), frame(site.normal));
-        pilot.mean(k, (&Sequence::new(seed, AGAIN), 2 * from), |index, point| {
+        let (seed, frame) = (hash(self.receivers.seed(i) ^ from), frame(site.normal));
+        pilot.mean(k, &Sequence::new(seed, AGAIN), |index, point| {
             let id = self.cast((&site, near), &frame, point, hash(hash(seed ^ AGAIN) ^ index));
             self.light(id).unwrap_or_default()
         })
@@ -196,6 +196,8 @@ pub struct HitTable {
     traced: Vec<u32>,
     /// Mean radiosity of the sky over each element's hemisphere, as two halves: what it gives unreflected, lux per band.
     daylight: Vec<[Bands; 2]>,
+    /// Rays of each element that told it.
+    looked: Vec<u32>,
     /// Label of each element: elements that see each other, directly or through others, share one.
     parts: Vec<u32>,
     from_afar: bool,
@@ -211,8 +213,8 @@ const ROWS: u32 = 0x0100;
 const LOOKS: u32 = 0x0190;
 
 /// Rays to the sky over all elements where rows have fewer and it is not seen from everywhere, and the most of each: a narrow window
-/// lights all of a room, and what it gives is to be known to two parts in a hundred.
-const SKY_RAYS: usize = 400_000;
+/// lights all of a room. What a slit of a centimetre gives a room of 80 m² is known to a tenth so, and to six tenths by rows of eight rays. As many of each as the longest rows have.
+const LOOKS_IN_ALL: usize = 400_000;
 const MOST_LOOKS: usize = 1024;
 
 /// Rows that are traced, and summed, by one thread at a time.
@@ -231,6 +233,7 @@ impl HitTable {
             all_ids: ids.len(),
             traced,
             daylight: vec![Default::default(); n],
+            looked: vec![0; n],
             parts,
             from_afar: false,
             room: usize::MAX,
@@ -303,12 +306,13 @@ impl HitTable {
         let room = self.room.saturating_sub(self.bytes_in_memory());
         let mut block = Block::new(starts, room, &self.folder)?;
         let done = AtomicUsize::new(0);
-        let mut daylight = vec![[[0f32; 3]; 2]; n];
+        let (mut daylight, mut looked) = (vec![[[0f32; 3]; 2]; n], vec![0; n]);
         let brightest = sky.iter().map(|l| luminance(*l)).fold(0.0, f32::max).into();
         let caster = Caster { tracer, ids, sky, receivers, from_afar: self.from_afar };
-        let looks = (SKY_RAYS / n.max(1)).min(MOST_LOOKS).next_multiple_of(2);
-        let chunks = block.writers(CHUNK).into_par_iter().zip(daylight.par_chunks_mut(CHUNK));
-        chunks.try_for_each(|(mut writer, daylight)| -> Result<(), ExtendError> {
+        let looks = (LOOKS_IN_ALL / n.max(1)).min(MOST_LOOKS).next_multiple_of(2) as u32;
+        let chunks =
+            block.writers(CHUNK).into_par_iter().zip(daylight.par_chunks_mut(CHUNK)).zip(looked.par_chunks_mut(CHUNK));
+        chunks.try_for_each(|((mut writer, daylight), looked)| -> Result<(), ExtendError> {
             let rows = writer.rows.clone();
             let mut pilot = Pilot::default();
             pilot.begin(rows.len(), if sky.is_empty() { 0 } else { more as u32 }, brightest);
@@ -323,11 +327,16 @@ impl HitTable {
             }
             writer.flush()?;
             if !sky.is_empty() {
-                if more < looks && !pilot.is_clear() {
-                    pilot.begin(rows.len(), looks as u32, brightest);
-                    rows.clone()
-                        .enumerate()
-                        .for_each(|(k, i)| caster.look((i, self.traced[i] / 2), looks as u32, k, &mut pilot));
+                let had = rows.clone().map(|i| self.looked[i]).min().unwrap_or(0);
+                let lacks = looks.saturating_sub(had);
+                if (more as u32) < lacks && !pilot.is_clear() {
+                    pilot.begin(rows.len(), lacks, brightest);
+                    for (k, i) in rows.clone().enumerate() {
+                        caster.look((i, self.traced[i] / 2), lacks, k, &mut pilot);
+                    }
+                }
+                for (k, looked) in looked.iter_mut().enumerate() {
+                    *looked = pilot.rays(k);
                 }
                 for (k, (i, daylight)) in rows.clone().zip(daylight).enumerate() {
                     *daylight = caster.daylight((i, self.traced[i] / 2), k, &mut pilot);
@@ -340,7 +349,8 @@ impl HitTable {
         for (i, found) in daylight.iter().enumerate() {
             let more = block.width(i) as u32;
             self.traced[i] += more;
-            let share = more as f32 / self.traced[i] as f32;
+            self.looked[i] += looked[i];
+            let share = looked[i] as f32 / self.looked[i].max(1) as f32;
             for (mean, new) in self.daylight[i].iter_mut().flatten().zip(found.as_flattened()) {
                 *mean += share * (new - *mean);
             }
@@ -631,7 +641,13 @@ mod tests {
             let mut table = HitTable::new(area.clone(), &ids);
             table.extend(&tracer, (&ids, &ids.sky.radiosity(&scene.sky)), &receivers, 8, &()).unwrap();
             let of = |(area, [a, b]): (&f64, &[Bands; 2])| area * f64::from(0.5 * (a[1] + b[1]));
-            area.iter().zip(table.daylight()).map(of).sum::<f64>() / exact
+            let found = area.iter().zip(table.daylight()).map(of).sum::<f64>() / exact;
+            // Once is enough: further columns look with their own rays.
+            let looked = table.looked.clone();
+            assert!(looked.iter().all(|rays| *rays >= 50));
+            table.extend(&tracer, (&ids, &ids.sky.radiosity(&scene.sky)), &receivers, 16, &()).unwrap();
+            assert!(table.looked.iter().zip(&looked).all(|(now, before)| (2..=8).contains(&(now - before))));
+            found
         };
         let found: Vec<f64> = sizes.iter().map(of_size).collect();
         let mean = found.iter().sum::<f64>() / found.len() as f64;
