@@ -212,9 +212,10 @@ const ROWS: u32 = 0x0100;
 /// The stream of those that look for the sky where rows have too few.
 const LOOKS: u32 = 0x0190;
 
-/// Rays to the sky over all elements where rows have fewer and it is not seen from everywhere, and the most of each: a narrow window
-/// lights all of a room. What a slit of a centimetre gives a room of 80 m² is known to a tenth so, and to six tenths by rows of eight rays. As many of each as the longest rows have.
-const LOOKS_IN_ALL: usize = 400_000;
+/// Rays to the sky over all elements where rows have fewer and it is not seen from everywhere, and the most of each, as many as the longest rows have: a narrow window
+/// lights all of a room. Light on a table behind one a hand wide has a standard deviation of a tenth between solutions of rows of eight rays with half as many, of a
+/// twentieth with twice as many.
+const LOOKS_IN_ALL: usize = 800_000;
 const MOST_LOOKS: usize = 1024;
 
 /// Rows that are traced, and summed, by one thread at a time.
