@@ -30,7 +30,7 @@ const NEIGHBOURS: usize = 4;
 const NORMALS: f64 = 16.0;
 
 /// Shares of the new rays that go everywhere alike, and where the whole group found light; the others go where neighbours did. Of 384 places on a table behind a
-/// window a hand wide, 64 rays each, the noise is 26 % so; 36 % with 0.375 for the group, 28 % with all for it, 31 % with 0.1 that go everywhere, 34 % with 0.4.
+/// window a hand wide, 64 rays each, the noise is 26 % so and 28 % with all for the group; 36 % with 0.375 for it, 31 % if a tenth goes everywhere then; 34 % with 0.3 and 0.4.
 ///
 /// First rays that count beside the new ones, by the balance heuristic and a density that does not know what their own half found, leave more noise than those that are
 /// thrown away (of 256 rays 8 instead of 6 %): where few rays met the window, each has nobody else that tells of it.
