@@ -5,8 +5,9 @@ use crate::numbers::place;
 use crate::output::print;
 use crate::{Failure, Global, faults};
 use clap::Args;
-use radiosity::{PointLightKind, Severity, counted};
+use radiosity::{Material, PointLightKind, Severity, counted};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 
 /// Arguments of `check`.
 #[derive(Args, Clone, Debug)]
@@ -49,12 +50,16 @@ fn summary(input: &Input) -> String {
             place(high.to_array())
         ));
     }
-    let emitting = scene.materials.iter().filter(|m| m.emits()).count();
-    let transmitting = match scene.materials.iter().filter(|m| m.transmits()).count() {
-        0 => String::new(),
-        sheets => format!(", {sheets} letting light through"),
-    };
-    lines.push(format!("  {}, {emitting} of them luminous{transmitting}", count(scene.materials.len(), "material")));
+    let used: BTreeSet<usize> = scene.objects.iter().map(|object| object.material).collect();
+    let of_used = |is: fn(&Material) -> bool| used.iter().filter(|k| is(&scene.materials[**k])).count();
+    let also = |n: usize, what: &str| if n > 0 { format!(", {n} {what}") } else { String::new() };
+    lines.push(format!(
+        "  {}, {} of them luminous{}{}",
+        count(scene.materials.len(), "material"),
+        of_used(Material::emits),
+        also(of_used(Material::transmits), "letting light through"),
+        also(scene.materials.len() - used.len(), "on no surface")
+    ));
     let (lights, cameras) = (count(scene.lights.len(), "light"), count(scene.cameras.len(), "camera"));
     lines.push(format!("  {lights} without area, {cameras}"));
     lines.extend(input.faults.0.iter().map(ToString::to_string));

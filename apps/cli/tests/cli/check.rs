@@ -36,7 +36,15 @@ fn check_lists_what_is_there() {
     assert!(quiet.out.starts_with("warning: twice.obj: ") && quiet.out.lines().count() == 1, "{quiet:?}");
 
     let said = room.run(["check"]).out;
-    assert!(said.contains("38 triangles in 19 objects") && said.contains("4 materials"), "{said}");
+    assert!(
+        said.contains("38 triangles in 19 objects") && said.contains("4 materials, 1 of them luminous\n"),
+        "{said}"
+    );
+    // A lamp that the material library has and no face uses gives no light.
+    room.write("m.mtl", "newmtl wall\nKd 1 1 1\nnewmtl lamp\nKd 1 1 1\nKe 9 9 9\n");
+    room.write("some.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl wall\nf 1 2 3\n");
+    let said = room.run(["check", "some.obj"]).out;
+    assert!(said.contains("2 materials, 0 of them luminous, 1 on no surface\n"), "{said}");
 }
 
 #[test]
