@@ -145,7 +145,7 @@ impl<'a> Gather<'a> {
     }
 }
 
-/// First rays that a group of receivers sends, about, which share what these found: with four times as many there is no less noise.
+/// First rays that a group of receivers sends, about, which share what these found: with four times as many there is about as much noise.
 const GROUP: usize = 1 << 13;
 
 /// How few and how many receivers that are: a few on either side are looked at where rays are many, and where they are few a group is not to reach far.
