@@ -308,8 +308,7 @@ impl Report {
                 format!("the lightmap has {texels} texels, {density:.1}{finest} per metre{needed}; {advice}")
             }
             None => {
-                let scales = solution.tracer().scales().iter().copied();
-                let width = solution.element_size * f64::from(scales.fold(1.0, f32::min));
+                let width = solution.narrowest();
                 format!("vertices are {width:.3} m apart, try --element-size {:.3}", 0.5 * width)
             }
         };

@@ -5,6 +5,7 @@ use crate::lightmap::automatic_texels;
 use crate::measure::{FIRST_PATHS, ROUND_GROWTH, Round, certify, is_stalled, most_paths, rays_for};
 use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::pace::{self, After, Paced};
+use crate::solution::Looking;
 use crate::texels::usual_rays;
 use crate::{Error, Indirect, Solution, SolveOptions, stations};
 use radiosity_scene::Bands;
@@ -170,7 +171,8 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
     let most_rounds = options.rounds + 1 + usize::from(first.is_some());
     let mut shadowing = Shadowing { places: 1, rays: rays_for(options.error, 128.0, 32, 4096) as u32 };
     monitor.round(1, most_rounds);
-    let mut solution = Solution::new(tracer, first.as_ref().unwrap_or(&usual), monitor)?;
+    let begun_with = first.as_ref().unwrap_or(&usual);
+    let mut solution = Solution::focused(tracer, begun_with, &Looking::Eyes(tracer.eyes()), (&stages, monitor))?;
     let most_paths = most_paths(options.error);
     let watched: Vec<Station> = stations::spread(&solution, options.audit_points, options.seed as u32);
     let places: Vec<_> = watched.iter().map(|s| s.place).collect();
@@ -257,8 +259,9 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
                 }
             } else {
                 stages.absorb(&solution.stages);
+                let scales = std::mem::take(&mut solution.scales);
                 drop(solution);
-                solution = Solution::new(tracer, &next, monitor)?;
+                solution = Solution::scaled(tracer, scales, &next, monitor)?;
             }
         }
         if ends {

@@ -141,17 +141,10 @@ const FIRST_SWEEPS: f64 = 4.0;
 const SOLVING_SWEEPS: f64 = 32.0;
 const FEW_RAYS: usize = 64 * FEW;
 
-/// What of its light may be missing in a place of another scale than the rest, where the residual, of all, does not tell: of 3 km of open site with
-/// a house nothing was left after two sweeps, and its rooms were up to a quarter too dark. And the most sweeps for that.
-const MISSING: f64 = 1e-3;
-const MOST_SWEEPS: f64 = 64.0;
-
 /// How to solve, and when an iterate will do.
 pub(crate) struct Task<'a> {
     pub solver: Solver,
     pub params: &'a Params,
-    /// Whether places are of several scales, so that the residual says nothing of the small ones.
-    pub is_uneven: bool,
     /// What is displayed, how near it has to be.
     pub displayed: Option<(&'a Screen, Displayed)>,
 }
@@ -168,10 +161,6 @@ pub(crate) fn solve(
     let solver = task.solver;
     let mut way = Way::new(solver.is_random(), task.params.tolerance, &response.diffuse.reflectance);
     let (mut looked, mut reached) = (f64::NEG_INFINITY, f64::INFINITY);
-    // So many sweeps leave of any light that.
-    let brightest = response.diffuse.reflectance.iter().copied().fold(0.1, f64::max);
-    let local = (MISSING.ln() / brightest.min(0.99).ln()).min(MOST_SWEEPS);
-    let is_local = task.is_uneven && matrix.is_none() && solver == Solver::DeflatedJacobi && task.displayed.is_none();
     let is_quick = x.len() / 3 * table.columns() <= FEW_RAYS;
     let first_sweeps = if is_quick { SOLVING_SWEEPS } else { FIRST_SWEEPS };
     let step = |x: &[f64], info: &Info| {
@@ -191,9 +180,6 @@ pub(crate) fn solve(
         if is_over(monitor) && (info.work >= first_sweeps || !solver.applies_only()) {
             return Go::Enough;
         }
-        if is_local && info.work >= local && info.residual.iter().all(|residual| *residual <= task.params.tolerance) {
-            return Go::Enough;
-        }
         if let Some((screen, asked)) = task.displayed {
             if info.work >= looked + LOOK || solver.is_direct() {
                 looked = info.work;
@@ -205,8 +191,8 @@ pub(crate) fn solve(
         }
         Go::On
     };
-    // Where the display decides, or the number of sweeps, the residual does not.
-    let tolerance = if task.displayed.is_some() || is_local { 0.0 } else { task.params.tolerance };
+    // Where the display decides, the residual does not.
+    let tolerance = if task.displayed.is_some() { 0.0 } else { task.params.tolerance };
     let params = Params { tolerance, ..*task.params };
     let solved = match matrix {
         Some(matrix) => solve_stored(solver, &matrix.factors, response, e, x, &params, step),

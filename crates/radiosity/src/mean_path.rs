@@ -23,7 +23,7 @@ impl SolveOptions {
     /// holds. As many for all rooms together as one of them has would leave each a few.
     pub(crate) fn cells_on_path(&mut self, tracer: &Tracer, count: f64) {
         let size = mean_path(tracer) / count;
-        let mut wanted = ((2.0 * scaled_area(tracer) / (size * size)) as usize).min(MOST_CELLS);
+        let mut wanted = ((2.0 * scaled_area(tracer.mesh, tracer.scales()) / (size * size)) as usize).min(MOST_CELLS);
         while wanted > self.cells && Solution::memory(tracer, &SolveOptions { cells: wanted, ..*self }) > self.memory {
             wanted /= 2;
         }

@@ -7,6 +7,7 @@
 
 use crate::monitor::{Monitor, Stages, has_time, is_over};
 use crate::points::{Asked, Light, Rays};
+use crate::solution::Looking;
 use crate::{Error, Solution, SolveOptions, stations};
 use glam::DVec3;
 use radiosity_scene::{Bands, Curve, luminance};
@@ -252,7 +253,8 @@ pub fn measure(
     };
     monitor.round(1, most_rounds);
     let mut solving = Instant::now();
-    let mut solution = Solution::new(tracer, &solve, monitor)?;
+    let mut solution = Solution::focused(tracer, &solve, &Looking::Places(&places), (&stages, monitor))?;
+    solve.cells = solution.cells_asked();
     let mut solution_takes = solving.elapsed().as_secs_f64();
 
     // The referee looks at every n-th point.
@@ -300,7 +302,8 @@ pub fn measure(
         // A finer solution need not be a better one, and a time limit may have left too little for its points.
         let answer = answer.or_better(best.take());
         let alone = options.solve.element_size.is_some() || solved % 2 == 1;
-        let next = if plan.solves_again { finer(&solve, solution.rays(), alone, least_variation) } else { solve };
+        let mut next = if plan.solves_again { finer(&solve, solution.rays(), alone, least_variation) } else { solve };
+        next.rays = next.rays.min(solution.most_rays(next.cells));
         let is_last = answer.achieved
             || rounds.len() >= most_rounds
             || places.is_empty()
@@ -370,8 +373,9 @@ fn solved_again<'t>(
     let again = if next.cells == before.cells {
         solution.refine(next.rays, monitor).map(|()| solution)
     } else {
+        let scales = std::mem::take(&mut solution.scales);
         drop(solution);
-        Solution::new(tracer, next, monitor)
+        Solution::scaled(tracer, scales, next, monitor)
     };
     match again {
         // How much room elements take is known once they are made.

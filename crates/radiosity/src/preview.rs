@@ -56,7 +56,7 @@ impl Glimpse {
             return Err(Error::Empty("the scene has no surface"));
         }
         let options = coarse(options);
-        let elements = Elements::new(scene, mesh, cell_width(tracer, &options));
+        let elements = Elements::new(scene, mesh, cell_width(mesh, tracer.scales(), &options));
         let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
         let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
 

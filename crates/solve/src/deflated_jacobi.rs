@@ -2,11 +2,13 @@
 //!
 //! Plain Jacobi (gathering) loses one factor ρ per sweep, because one error mode, the constant irradiance, decays as
 //! slowly as ρ̄; all others die at about half that rate (a closed cube has eigenvalues 1, 0.51, …). After each sweep
-//! the multiple c of v = R 1 that makes the residual's area integral vanish is added: a coarse space of one vector
-//! for each part of the scene that sees no other (a two-level method; Nicolaides 1987). One vector for all rooms
-//! together would pour a part of a bright room's error into a dark one. Where sheets pass light from part to part, the
-//! multiples c of all parts follow from one another ([`Coarse`]). On a closed cube at ρ = 0.95 that takes 20
-//! sweeps instead of 269.
+//! the multiple c of a vector v that makes the residual's area integral vanish is added: a coarse space of one vector
+//! for each part of the scene that sees no other (a two-level method; Nicolaides 1987). Where sheets pass light from part to part, the
+//! multiples c of all parts follow from one another ([`Coarse`]).
+//!
+//! v is what is reflected so far, B − E: so dim places get in proportion to what they have. The textbook's v = R 1 pours a part of a bright place's error into all that
+//! is joined to it, and what has a thousandth of its light is far off when the residual, of all, is small. That of the first sweep alone is R 1 wherever there is a tenth of the mean light, or the
+//! pattern of one sweep, many times too large, would have to die away first. On a closed cube at ρ = 0.95 1e-6 takes 12 sweeps or fewer instead of 269.
 
 use crate::gauge::{Gauge, is_done, remainder};
 use crate::{Go, Info, Params, Response, Sheets, SolveError, Space, Transport};
@@ -29,10 +31,8 @@ pub fn deflated_jacobi<T: Transport>(
     let bands = response.bands();
     let n = b.len();
     let (mut h, mut r) = (vec![0.0; n], vec![0.0; n]);
-    let ones = vec![1.0; n];
 
-    // The coarse vector v = R 1, its image under F, and the balance of v itself, part by part. A response that mixes
-    // unknowns at will leaves no part to itself.
+    // A response that mixes unknowns at will leaves no part to itself.
     let sheets = response.sheets();
     let parts = transport.parts().filter(|_| sheets.is_some());
     let part = |i: usize, band: usize| parts.map_or(0, |p| p[i] as usize) * bands + band;
@@ -43,43 +43,128 @@ pub fn deflated_jacobi<T: Transport>(
         space.accumulate(x, bands, |i, band, weighted| sums[part(i, band)] += weighted);
         sums
     };
-    let (mut v, mut fv) = (vec![0.0; n], vec![0.0; n]);
-    response.respond(&ones, &mut v);
-    transport.apply(&v, &mut fv, bands)?;
-    response.respond(&fv, &mut r);
-    let kept: Vec<f64> = v.iter().zip(&r).map(|(v, rfv)| v - rfv).collect();
-    let mut coarse = Coarse { balance: balance(&kept), links: Vec::new() };
-    if let Some(sheets) = sheets.filter(|sheets| slots > bands && sheets.sides() > 0) {
-        coarse.link(space, sheets, &fv, bands, part);
+    // The first sweep from nothing.
+    if b.iter().all(|b| *b == 0.0) {
+        b.copy_from_slice(e);
     }
-
     transport.apply(b, &mut h, bands)?;
+    // F E, and the balance of R F E.
+    let mut of_e = (if b == e { h.clone() } else { Vec::new() }, Vec::new());
     let gauge = Gauge::new(transport, response, e);
-    let mut info = Info { steps: 2, work: 2.0, ..Info::default() };
-    loop {
+    let mut info = Info { steps: 1, work: 1.0, ..Info::default() };
+    let apply = |x: &[f64], fx: &mut [f64], info: &mut Info| {
+        (info.steps, info.work) = (info.steps + 1, info.work + 1.0);
+        transport.apply(x, fx, bands)
+    };
+    let mut changed = f64::INFINITY;
+    for sweep in 0.. {
         gauge.measure(transport, response, (e, b, &h), &mut r, &mut info);
-        if is_done(b, &info, params, &mut step)? {
-            return Ok(info);
+        // Changes that fall by a factor q from sweep to sweep come to q/(1 − q) times the last one.
+        let now = change(b, &r, bands);
+        let factor = (now / changed).clamp(0.0, SLOWEST);
+        let left = now * (factor / (1.0 - factor)).max(1.0);
+        changed = now;
+        let is_settled = info.work >= MOST_LOCAL || left <= SETTLED * params.tolerance;
+        let tolerance = if is_settled { params.tolerance } else { 0.0 };
+        if is_done(b, &info, &Params { tolerance, ..*params }, &mut step)? {
+            break;
+        }
+        // The coarse vector of the first sweep and its image under F, which is linear.
+        let first = match sweep {
+            0 => {
+                let [mut v, mut fv] = [vec![0.0; n], vec![0.0; n]];
+                even(space, response, &h, bands, &mut v);
+                apply(&v, &mut fv, &mut info)?;
+                Some((v, fv))
+            }
+            _ => None,
+        };
+        if sweep == 1 {
+            let (fe, rfe) = &mut of_e;
+            if fe.is_empty() {
+                *fe = vec![0.0; n];
+                apply(e, fe, &mut info)?;
+            }
+            let mut reflected = vec![0.0; n];
+            response.respond(fe, &mut reflected);
+            *rfe = balance(&reflected);
         }
 
         // Sweep: B + r is E + R F B.
         for (b, r) in b.iter_mut().zip(&r) {
             *b += r;
         }
-        transport.apply(b, &mut h, bands)?;
-        info.steps += 1;
-        info.work += 1.0;
+        apply(b, &mut h, &mut info)?;
 
-        // Deflate: the share of v that balances the area integral of the new residual. F is linear, so h follows.
+        // Deflate: the share of v that balances the area integral of the new residual.
         remainder(response, (e, b, &h), &mut r);
-        let multiples = coarse.solve(balance(&r));
+        let lacking = balance(&r);
+        let (fe, rfe) = &of_e;
+        let kept = match &first {
+            Some((v, fv)) => {
+                let mut kept = vec![0.0; n];
+                response.respond(fv, &mut kept);
+                kept.iter_mut().zip(v).for_each(|(rfv, v)| *rfv = v - *rfv);
+                balance(&kept)
+            }
+            // v is B − E, so that v − R F v is R F E less the residual.
+            None => rfe.iter().zip(&lacking).map(|(rfe, lacking)| rfe - lacking).collect(),
+        };
+        let mut coarse = Coarse { balance: kept, links: Vec::new() };
+        if let Some(sheets) = sheets.filter(|sheets| slots > bands && sheets.sides() > 0) {
+            let fv = || h.iter().zip(fe).map(|(h, fe)| h - fe).collect();
+            let fv = first.as_ref().map_or_else(fv, |(_, fv)| fv.clone());
+            coarse.link(space, sheets, &fv, bands, part);
+        }
+        let multiples = coarse.solve(lacking);
         for k in 0..n {
             if let Some(c) = multiples[part(k / bands, k % bands)] {
-                b[k] += c * v[k];
-                h[k] += c * fv[k];
+                let (v, fv) = first.as_ref().map_or_else(|| (b[k] - e[k], h[k] - fe[k]), |(v, fv)| (v[k], fv[k]));
+                b[k] += c * v;
+                h[k] += c * fv;
             }
         }
     }
+    Ok(info)
+}
+
+/// What sweeps still change of each unknown, relative to itself, in the root mean square over all: at most this, over the tolerance. The residual is that of the brightest and says
+/// nothing of dim places: of 3 km of open site with a house nothing was left after two sweeps, and its rooms were up to a quarter too dark.
+const SETTLED: f64 = 30.0;
+
+/// Work after which the residual is enough.
+const MOST_LOCAL: f64 = 64.0;
+
+/// The slowest that changes are believed to fall from sweep to sweep.
+const SLOWEST: f64 = 0.95;
+
+/// Light beside the brightest below which nobody asks.
+const DARK: f64 = 1e-6;
+
+/// What the next sweep changes of each unknown, relative to itself, in the root mean square over all.
+fn change(b: &[f64], r: &[f64], bands: usize) -> f64 {
+    let mut least = vec![f64::MIN_POSITIVE; bands];
+    for b in b.chunks_exact(bands) {
+        least.iter_mut().zip(b).for_each(|(least, b)| *least = least.max(DARK * b.abs()));
+    }
+    let relative = |(k, (b, r)): (usize, (&f64, &f64))| (r / b.abs().max(least[k % bands])).powi(2);
+    (b.iter().zip(r).enumerate().map(relative).sum::<f64>() / b.len().max(1) as f64).sqrt()
+}
+
+/// Irradiance beside the mean from which on places are given the same.
+const LIT: f64 = 0.1;
+
+/// What surfaces reflect of an irradiance that is the same wherever there is a tenth of the mean, and less in proportion where there is less.
+fn even(space: &impl Space, response: &(impl Response + ?Sized), h: &[f64], bands: usize, v: &mut [f64]) {
+    let (mut sums, mut areas) = (vec![0.0; bands], vec![0.0; bands]);
+    space.accumulate(h, bands, |_, band, weighted| sums[band] += weighted);
+    space.accumulate(&vec![1.0; h.len()], bands, |_, band, weighted| areas[band] += weighted);
+    let even = |(k, h): (usize, &f64)| {
+        let least = LIT * sums[k % bands] / areas[k % bands];
+        if least > 0.0 { (h / least).clamp(0.0, 1.0) } else { 1.0 }
+    };
+    let shape: Vec<f64> = h.iter().enumerate().map(even).collect();
+    response.respond(&shape, v);
 }
 
 /// The balance of the parts: a_p c_p − Σ_q l_pq c_q = what part p lacks, with a_p the balance of its own coarse vector and

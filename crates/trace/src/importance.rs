@@ -19,7 +19,7 @@ const VISITED: usize = 8;
 const PATHS: u64 = 0x50bb << 32;
 
 /// Visits by which importance is known. Triangles with fewer, and those of one wall, share those of their neighbours in the list.
-const KNOWN: u32 = 32;
+const KNOWN: f64 = 32.0;
 
 /// So many times as important for its area as the scene is on average a surface is in any room, where an eye is near it.
 const USUAL: f64 = 4.0;
@@ -48,33 +48,42 @@ pub(crate) fn scales(tracer: &Tracer, eyes: &[DVec3]) -> Vec<f32> {
     if visited.is_empty() {
         return Vec::new();
     }
-    let mut visits = vec![0u32; mesh.triangles.len()];
-    visited.iter().for_each(|&triangle| visits[triangle as usize] += 1);
+    let mut visits = vec![0.0; mesh.triangles.len()];
+    visited.iter().for_each(|&triangle| visits[triangle as usize] += 1.0);
+    narrowed(mesh, &visits, &[])
+}
 
-    let per_area = visited.len() as f64 / mesh.whole_area();
-    let mut scales: Vec<f32> = Vec::with_capacity(visits.len());
-    let (mut area, mut count) = (0.0, 0);
+/// For each triangle how wide its cells are to be where `visits`, all of chance, tell how important it is and cells are of other `scales` already: such that their
+/// number is a quarter of what its importance is of all, where that is more than the number that it has. Empty where all are as wide.
+pub fn narrowed(mesh: &Mesh, visits: &[f64], scales: &[f32]) -> Vec<f32> {
+    let before = |t: usize| scales.get(t).map_or(1.0, |scale| f64::from(*scale));
+    let cells = |t: usize| mesh.area(t) / before(t).powi(2);
+    let per_area = visits.iter().sum::<f64>() / (0..visits.len()).map(cells).sum::<f64>();
+    let mut narrower: Vec<f64> = Vec::with_capacity(visits.len());
+    let (mut area, mut count) = (0.0, 0.0);
     for (t, own) in visits.iter().enumerate() {
-        area += mesh.area(t);
+        area += cells(t);
         count += own;
         // Cells of one wall are as wide on all its pieces, or light would break where they meet.
-        let is_large = |t: usize| per_area * mesh.area(t) >= f64::from(KNOWN);
+        let is_large = |t: usize| per_area * cells(t) >= KNOWN;
         let is_alike = |next: usize| {
-            let (expected, found) = (f64::from(count) / area * mesh.area(next), f64::from(visits[next]));
+            let (expected, found) = (count / area * cells(next), visits[next]);
             let most = found.max(expected);
             (found - expected).abs() <= (CHANCE * most.sqrt()).max(UNLIKE * most)
         };
         let goes_on = t + 1 < visits.len() && !is_large(t) && !is_large(t + 1) && is_flat(mesh, t) && is_alike(t + 1);
-        if (count >= KNOWN || per_area * area >= f64::from(KNOWN)) && !goes_on {
-            let usual = USUAL * per_area * area / f64::from(count.max(1));
-            scales.resize(t + 1, usual.sqrt().clamp(LEAST, 1.0) as f32);
-            (area, count) = (0.0, 0);
+        if (count >= KNOWN || per_area * area >= KNOWN) && !goes_on {
+            let usual = USUAL * per_area * area / count.max(1.0);
+            narrower.resize(t + 1, usual.sqrt().min(1.0));
+            (area, count) = (0.0, 0.0);
         }
     }
     // Too few at the end to be known share with those before.
-    let last = scales.last().copied().unwrap_or(1.0);
-    scales.resize(visits.len(), last);
-    if scales.iter().all(|scale| *scale == 1.0) { Vec::new() } else { scales }
+    let last = narrower.last().copied().unwrap_or(1.0);
+    narrower.resize(visits.len(), last);
+    let scale = |(t, narrower): (usize, &f64)| (before(t) * narrower).max(LEAST) as f32;
+    let all: Vec<f32> = narrower.iter().enumerate().map(scale).collect();
+    if all.iter().all(|scale| *scale == 1.0) { Vec::new() } else { all }
 }
 
 /// Whether a triangle and the next one face the same way.

@@ -24,6 +24,7 @@ mod walk;
 
 pub use brute::{blocked_brute, closest_brute, closest_where_brute};
 pub use emitters::{Emitter, EmitterTree};
+pub use importance::narrowed;
 pub use ray::{Hit, Ray};
 pub use tree::{Flaw, Tree};
 

@@ -103,6 +103,8 @@ pub struct Tracer<'a> {
     all_opaque: bool,
     /// How wide cells are to be.
     scales: Vec<f32>,
+    /// From where light is looked at.
+    eyes: Vec<DVec3>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -214,6 +216,7 @@ impl<'a> Tracer<'a> {
             normals: (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t).as_vec3()).collect(),
             edge: (0..mesh.triangles.len()).into_par_iter().map(|t| edge_weight(mesh.corners(t), offset)).collect(),
             scales: Vec::new(),
+            eyes: Vec::new(),
         }
     }
 
@@ -221,7 +224,13 @@ impl<'a> Tracer<'a> {
     /// elements. Without it a room on a wide site has a few, whatever is asked.
     pub fn seen_from(mut self, eyes: &[DVec3]) -> Tracer<'a> {
         self.scales = crate::importance::scales(&self, eyes);
+        self.eyes = eyes.to_vec();
         self
+    }
+
+    /// The places from which light is looked at, if that was told.
+    pub fn eyes(&self) -> &[DVec3] {
+        &self.eyes
     }
 
     /// For each triangle how wide its cells are to be, relative to those of most of the scene and at most 1; empty where all are as wide.
@@ -241,6 +250,7 @@ impl<'a> Tracer<'a> {
             + size_of_val(&*self.normals)
             + size_of_val(&*self.edge)
             + size_of_val(&*self.scales)
+            + size_of_val(&*self.eyes)
     }
 
     /// The tree of boxes (its coordinates are relative to the scene's centre).

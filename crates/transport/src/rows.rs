@@ -520,6 +520,11 @@ pub struct RowIds<'a> {
 }
 
 impl<'a> RowIds<'a> {
+    /// The number of the row.
+    pub fn row(&self) -> usize {
+        self.i
+    }
+
     /// The ids.
     pub fn ids(&self) -> impl Iterator<Item = u32> + 'a {
         self.blocks().flatten().copied()

@@ -4,9 +4,11 @@
 //! X = (E − P) + R (D + S + F X), with D the direct irradiance and S the sky's, both known before the solve.
 
 mod balance;
+mod focus;
 mod options;
 
 pub use balance::Balance;
+pub(crate) use focus::Looking;
 pub use options::SolveOptions;
 pub(crate) use options::{cell_width, scaled_area};
 
@@ -59,6 +61,8 @@ pub struct Solution<'a> {
     pub stages: Stages,
     /// Width of a cell, metres; of the widest where what is seen has smaller ones.
     pub element_size: f64,
+    /// Width of the cells of each triangle relative to that; empty where all are as wide.
+    pub(crate) scales: Vec<f32>,
     sky: SkyPatches,
     table: HitTable,
     /// Whether time left fewer rays than were asked for.
@@ -79,9 +83,7 @@ impl<'a> Solution<'a> {
     /// [`Error::Memory`] and [`Error::Elimination`] before anything large is allocated; [`Error::Reciprocity`];
     /// [`Error::Stopped`]; [`Error::Solve`]; [`Error::File`].
     pub fn new(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
-        let mut solution = Solution::begin(tracer, options, monitor)?;
-        solution.refine(options.rays, monitor)?;
-        Ok(solution)
+        Solution::scaled(tracer, tracer.scales().to_vec(), options, monitor)
     }
 
     /// A first answer, before any row is traced: elements, their direct light, and for the rest the ambient term
@@ -92,6 +94,27 @@ impl<'a> Solution<'a> {
     /// [`Error::Memory`] and [`Error::Elimination`] before anything large is allocated; [`Error::Reciprocity`];
     /// [`Error::Transmission`]; [`Error::Tolerance`]; [`Error::Stopped`].
     pub fn begin(tracer: &'a Tracer<'a>, options: &SolveOptions, monitor: &dyn Monitor) -> Result<Solution<'a>, Error> {
+        Solution::begin_scaled(tracer, tracer.scales().to_vec(), options, monitor)
+    }
+
+    /// [`Solution::new`] with cells of other widths relative to each other ([`Solution::focus`]).
+    pub(crate) fn scaled(
+        tracer: &'a Tracer<'a>,
+        scales: Vec<f32>,
+        options: &SolveOptions,
+        monitor: &dyn Monitor,
+    ) -> Result<Solution<'a>, Error> {
+        let mut solution = Solution::begin_scaled(tracer, scales, options, monitor)?;
+        solution.refine(options.rays, monitor)?;
+        Ok(solution)
+    }
+
+    fn begin_scaled(
+        tracer: &'a Tracer<'a>,
+        scales: Vec<f32>,
+        options: &SolveOptions,
+        monitor: &dyn Monitor,
+    ) -> Result<Solution<'a>, Error> {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
         if mesh.triangles.is_empty() {
             return Err(Error::Empty("the scene has no surface"));
@@ -102,7 +125,7 @@ impl<'a> Solution<'a> {
         options.refuse_unfit_solver(scene)?;
         options.refuse_beyond_single_precision()?;
         let stages = Stages::default();
-        let width = cell_width(tracer, options);
+        let width = cell_width(mesh, &scales, options);
         options.refuse_large_matrices(Elements::count(scene, mesh, width))?;
         let needed = Solution::memory(tracer, options);
         if needed > options.memory {
@@ -173,6 +196,7 @@ impl<'a> Solution<'a> {
             info: Info::default(),
             stages,
             element_size: width.size,
+            scales,
             sky,
             table,
             is_cut: false,
@@ -239,7 +263,7 @@ impl<'a> Solution<'a> {
     /// Bytes that the scene, its mesh and tree and a solution with these options take, as far as that is known before the
     /// elements are made: none of them divided. Rays may lie in a file and do not count.
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
-        let cells = Elements::count(tracer.scene, tracer.mesh, cell_width(tracer, options));
+        let cells = Elements::count(tracer.scene, tracer.mesh, cell_width(tracer.mesh, tracer.scales(), options));
         let solution = footprint::solution(tracer, cells, Luminaires::most(tracer.scene));
         solution.saturating_add(options.stored(cells, cells))
     }
@@ -247,8 +271,13 @@ impl<'a> Solution<'a> {
     /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
     pub(crate) fn fits(tracer: &Tracer, options: &SolveOptions) -> bool {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
-        let elements = Elements::count(scene, mesh, cell_width(tracer, options));
+        let elements = Elements::count(scene, mesh, cell_width(mesh, tracer.scales(), options));
         Solution::memory(tracer, options) <= options.memory && options.solver.matrix_bytes(elements) <= options.memory
+    }
+
+    /// Width of the narrowest cells, metres.
+    pub fn narrowest(&self) -> f64 {
+        self.element_size * f64::from(self.scales.iter().copied().fold(1.0, f32::min))
     }
 
     /// The tracer that the solution was made with.
@@ -400,7 +429,6 @@ impl<'a> Solution<'a> {
         let task = Task {
             solver: self.options.solver,
             params: &self.options.params,
-            is_uneven: !self.tracer.scales().is_empty(),
             displayed: screen.as_ref().map(|(screen, asked)| (screen, *asked)),
         };
         let operator = (&self.table, self.matrix.as_ref());

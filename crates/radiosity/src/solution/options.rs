@@ -4,7 +4,7 @@ use super::Solution;
 use crate::displayed::Displayed;
 use crate::equation::{RANDOM_TOLERANCE, TABLE_TOLERANCE};
 use crate::{Error, Monitor};
-use radiosity_scene::{CellWidth, Scene};
+use radiosity_scene::{CellWidth, Mesh, Scene};
 use radiosity_solve::{Params, Solver};
 use radiosity_trace::Tracer;
 use radiosity_transport::exposure::Care;
@@ -148,11 +148,11 @@ impl SolveOptions {
         while self.rays > LEAST_RAYS && self.stored(1, 1) > 0 && lacks_room(self) {
             self.rays /= 2;
         }
-        let usual = cell_width(tracer, self).size;
+        let usual = cell_width(tracer.mesh, tracer.scales(), self).size;
         while self.element_size.is_none() && self.cells > 1 && lacks_room(self) {
             self.cells = self.cells * 3 / 4;
         }
-        let wider = cell_width(tracer, self).size / usual;
+        let wider = cell_width(tracer.mesh, tracer.scales(), self).size / usual;
         if wider > 1.0 {
             monitor.note(&format!("elements are {wider:.1} times as wide as usual: memory holds no more"));
         }
@@ -160,17 +160,15 @@ impl SolveOptions {
 }
 
 /// Width of cells: as asked, or such that the scene's area makes as many as asked, narrower in places of a smaller scale.
-pub(crate) fn cell_width<'a>(tracer: &'a Tracer, options: &SolveOptions) -> CellWidth<'a> {
+pub(crate) fn cell_width<'s>(mesh: &Mesh, scales: &'s [f32], options: &SolveOptions) -> CellWidth<'s> {
     options.element_size.map_or_else(
-        || CellWidth {
-            size: (2.0 * scaled_area(tracer) / options.cells.max(1) as f64).sqrt(),
-            scales: tracer.scales(),
-        },
+        || CellWidth { size: (2.0 * scaled_area(mesh, scales) / options.cells.max(1) as f64).sqrt(), scales },
         CellWidth::from,
     )
 }
 
 /// Area that each triangle would have were all places of one scale, m².
-pub(crate) fn scaled_area(tracer: &Tracer) -> f64 {
-    (0..tracer.mesh.triangles.len()).map(|t| tracer.mesh.area(t) / tracer.scale(t).powi(2)).sum()
+pub(crate) fn scaled_area(mesh: &Mesh, scales: &[f32]) -> f64 {
+    let scale = |t: usize| scales.get(t).map_or(1.0, |scale| f64::from(*scale));
+    (0..mesh.triangles.len()).map(|t| mesh.area(t) / scale(t).powi(2)).sum()
 }

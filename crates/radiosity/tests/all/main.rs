@@ -17,6 +17,7 @@ mod gathers;
 mod lamps;
 mod layers;
 mod live;
+mod narrow;
 mod paint;
 mod planes;
 mod refusals;

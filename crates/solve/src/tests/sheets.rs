@@ -152,3 +152,19 @@ fn catalogue_13_deflation_of_rooms_that_a_pane_joins() {
         }
     }
 }
+
+/// A room that has a ten-thousandth of the light of the one beside it is solved by its own light: what balances the energy of both is added in proportion to what
+/// each has, and the residual, of all, is not the last word.
+#[test]
+fn catalogue_13_a_dim_room_beside_a_bright_one() {
+    for (walls, tau) in [(0.5, 1e-3), (0.8, 1e-4), (0.9, 1e-4)] {
+        let optics = ([walls, 0.5, 0.5, walls], tau);
+        let mut b = vec![0.0; 8];
+        let e = [1.0, 1.0, 0., 0., 0., 0., 0., 0.];
+        let params = Params { tolerance: 1e-4, ..Params::default() };
+        deflated_jacobi(&rooms(), &pane([optics; 2]), &e, &mut b, &params, |_, _| Go::On).unwrap();
+        for (b, exact) in b.chunks_exact(2).zip(balance(optics.0, tau)) {
+            assert!((b[0] / exact - 1.0).abs() <= 0.01, "{walls}, {tau}: {} for {exact}", b[0]);
+        }
+    }
+}
