@@ -234,11 +234,15 @@ pub fn bake<'a>(tracer: &'a Tracer<'a>, options: &BakeOptions, monitor: &dyn Mon
         let noisy = !usual.looked_up && solution.field_noise(&received) > 0.5 * options.error;
         let is_given = options.solve.element_size.is_some();
         let next = match first.take() {
-            Some(_) => usual,
+            Some(_) => SolveOptions {
+                cells: usual.cells.max(solution.options.cells),
+                rays: usual.rays.max(solution.rays()),
+                ..usual
+            },
             None if noisy => SolveOptions { rays: 2 * solution.rays(), ..solution.options },
             None => SolveOptions { rays: solution.rays(), cells: 2 * solution.options.cells, ..usual },
         };
-        let fits = Solution::fits(tracer, &next);
+        let fits = solution.has_room_for(&next);
         let is_last = achieved || rounds.len() >= most_rounds || !fits || (is_given && !noisy) || is_stalled(&rounds);
         // Once begun a round is brought to its end, so that what it replaces may go.
         let out_of_time = !is_last && !has_time(monitor, ROUND_GROWTH * begun.elapsed().as_secs_f64());

@@ -254,7 +254,7 @@ pub fn measure(
     monitor.round(1, most_rounds);
     let mut solving = Instant::now();
     let mut solution = Solution::focused(tracer, &solve, &Looking::Places(&places), (&stages, monitor))?;
-    solve.cells = solution.cells_asked();
+    let least_rays = std::mem::replace(&mut solve, solution.options_asked()).rays;
     let mut solution_takes = solving.elapsed().as_secs_f64();
 
     // The referee looks at every n-th point.
@@ -302,13 +302,15 @@ pub fn measure(
         // A finer solution need not be a better one, and a time limit may have left too little for its points.
         let answer = answer.or_better(best.take());
         let alone = options.solve.element_size.is_some() || solved % 2 == 1;
+        // Rays alone, where there are as many as may be, would be the same again.
+        let alone = alone && solution.most_rays(solve.cells) > solution.rays();
         let mut next = if plan.solves_again { finer(&solve, solution.rays(), alone, least_variation) } else { solve };
-        next.rays = next.rays.min(solution.most_rays(next.cells));
+        next.rays = next.rays.min(solution.most_rays(next.cells)).max(least_rays);
         let is_last = answer.achieved
             || rounds.len() >= most_rounds
             || places.is_empty()
             || is_stalled(&rounds)
-            || !Solution::fits(tracer, &next);
+            || !solution.has_room_for(&next);
         let takes = match plan.solves_again {
             true => ROUND_GROWTH * (solution_takes + light.seconds),
             false => light.seconds.max(begun.elapsed().as_secs_f64()),

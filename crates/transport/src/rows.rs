@@ -526,13 +526,20 @@ impl<'a> RowIds<'a> {
     }
 
     /// The ids.
-    pub fn ids(&self) -> impl Iterator<Item = u32> + 'a {
+    pub fn ids(&self) -> impl Iterator<Item = u32> + use<'a> {
         self.blocks().flatten().copied()
+    }
+
+    /// Up to so many of them from all over the row, as halves of it are sorted.
+    pub fn some(&self, most: usize) -> impl Iterator<Item = u32> + use<'a> {
+        let all = self.blocks().map(<[u32]>::len).sum::<usize>();
+        let step = all.div_ceil(most).max(1);
+        self.ids().skip(step / 2).step_by(step)
     }
 
     /// The same block by block.
     #[inline]
-    fn blocks(&self) -> impl Iterator<Item = &'a [u32]> + 'a {
+    fn blocks(&self) -> impl Iterator<Item = &'a [u32]> + use<'a> {
         let RowIds { i, lent } = *self;
         lent.iter().map(move |lent| lent.row(i))
     }

@@ -6,6 +6,7 @@
 //! (Smits, Arvo and Salesin 1992, "An importance-driven radiosity algorithm", §3), which is light that goes backwards through the same rows. A surface that matters more than
 //! four times as much as it has cells has as many of them, in the next solution, as a quarter of that.
 
+use super::FEW;
 use super::{Solution, SolveOptions};
 use crate::Error;
 use crate::monitor::{Monitor, Stages, has_time};
@@ -40,7 +41,7 @@ const WIDE: f64 = 0.125;
 /// what they see, and their noise does not average out.
 const MORE_CELLS: usize = 4;
 const MOST_CELLS: usize = 20_000;
-const MORE_RAYS: f64 = 64.0;
+const MORE_RAYS: usize = 64;
 const MOST_RAYS: f64 = 1.6e7;
 
 /// Rays of all rows that later solutions may have: what is left is not noise of rows, or the audit's own.
@@ -48,6 +49,16 @@ const MOST_IN_ALL: f64 = 2e7;
 
 /// How often a solution is looked at so.
 const MOST_LOOKS: usize = 2;
+
+/// Vectors of a number for each element that looking takes at once.
+const MOST_VECTORS: usize = 8;
+
+/// The first ids of a row.
+#[derive(Clone, Copy, Default)]
+struct Row {
+    ids: [u32; OF_ROW],
+    count: usize,
+}
 
 /// From where light is looked at.
 pub(crate) enum Looking<'l> {
@@ -57,8 +68,17 @@ pub(crate) enum Looking<'l> {
     Eyes(&'l [DVec3]),
 }
 
+impl Looking<'_> {
+    fn is_nowhere(&self) -> bool {
+        match self {
+            Looking::Places(places) => places.is_empty(),
+            Looking::Eyes(eyes) => eyes.is_empty(),
+        }
+    }
+}
+
 impl<'a> Solution<'a> {
-    /// Solves, and if most of the light that is looked at turns out to come by few places, again with smaller cells there and more rays: what all light comes by has
+    /// Solves, and if much of the light that is looked at turns out to come by few places, again with smaller cells there and more rays: what all light comes by has
     /// noise that does not average out over what is seen.
     ///
     /// # Errors
@@ -71,33 +91,41 @@ impl<'a> Solution<'a> {
     ) -> Result<Solution<'a>, Error> {
         let mut began = Instant::now();
         let mut solution = Solution::new(tracer, options, monitor)?;
-        if options.element_size.is_some() {
+        // Sizes that were asked for stay, and matrices grow with the square of the elements.
+        if options.element_size.is_some() || options.form_factors.is_some() || !options.solver.applies_only() {
             return Ok(solution);
         }
         // What wide cells tell of narrow places is little.
         for _ in 0..MOST_LOOKS {
-            let Some(scales) = solution.narrowed(looking)? else { break };
-            let with_more = SolveOptions {
-                cells: options.cells.max((MORE_CELLS * options.cells).min(MOST_CELLS)),
-                rays: (options.rays as f64 * (MOST_RAYS / solution.rays_in_all()).clamp(1.0, MORE_RAYS)) as usize,
-                ..*options
-            };
-            let next = if Solution::fits(tracer, &with_more) { with_more } else { *options };
-            let takes = next.rays as f64 / solution.rays() as f64 * began.elapsed().as_secs_f64();
-            if !has_time(monitor, takes) {
+            if !has_time(monitor, began.elapsed().as_secs_f64()) {
+                break;
+            }
+            let looked = Stages::default();
+            let narrowed = looked.time(monitor, "importance", || solution.narrowed(looking))?;
+            stages.absorb(&looked);
+            let Some(scales) = narrowed else { break };
+            let cells = options.cells.max((MORE_CELLS * options.cells).min(MOST_CELLS));
+            let rays = (MOST_RAYS * solution.share_of_rays(cells)) as usize;
+            let next = SolveOptions { cells, rays: rays.clamp(options.rays, MORE_RAYS * options.rays), ..*options };
+            let takes = next.rays as f64 / (solution.share_of_rays(cells) * solution.rays_in_all());
+            if !has_time(monitor, takes.max(1.0) * began.elapsed().as_secs_f64()) {
                 break;
             }
             began = Instant::now();
             stages.absorb(&solution.stages);
             drop(solution);
-            solution = Solution::scaled(tracer, scales, &next, monitor)?;
+            solution = match Solution::scaled(tracer, scales, &next, monitor) {
+                // How much room they take is known once they are made.
+                Err(Error::Memory { .. } | Error::File(_)) => return Solution::new(tracer, options, monitor),
+                again => again?,
+            };
         }
         Ok(solution)
     }
 
-    /// Cells that it was to have.
-    pub(crate) fn cells_asked(&self) -> usize {
-        self.options.cells
+    /// How it was to be solved.
+    pub(crate) fn options_asked(&self) -> SolveOptions {
+        self.options
     }
 
     /// Rays per cell that another solution of so many cells is worth: as many as there may be, but where cells are narrow already because light comes by few places, and have many.
@@ -105,13 +133,21 @@ impl<'a> Solution<'a> {
         if self.scales == self.tracer.scales() {
             return usize::MAX;
         }
-        let more_cells = cells as f64 / self.options.cells.max(1) as f64;
-        (MOST_IN_ALL / (self.rays_in_all() * more_cells) * self.rays() as f64) as usize
+        (MOST_IN_ALL * self.share_of_rays(cells)) as usize
     }
 
-    /// For each triangle how wide its cells are to be, relative to the widest, so that they are small where light comes from that is looked at; none where most of it comes by
+    /// What each of so many cells would have of all rays, of parts of cells as there are.
+    fn share_of_rays(&self, cells: usize) -> f64 {
+        let fewer = self.options.cells.max(1) as f64 / cells.max(1) as f64;
+        fewer * self.rays().max(1) as f64 / self.rays_in_all().max(1.0)
+    }
+
+    /// For each triangle how wide its cells are to be, relative to the widest, so that they are small where light comes from that is looked at; none where it comes by
     /// cells that are as they ought to be, as far as this solution tells.
     fn narrowed(&self, looking: &Looking) -> Result<Option<Vec<f32>>, Error> {
+        if looking.is_nowhere() {
+            return Ok(None);
+        }
         let Some(mut shares) = self.importance(looking)? else { return Ok(None) };
         // Light that several gave in turn counts for each.
         shares.iter_mut().zip(self.reflected()).for_each(|(share, b)| *share *= b);
@@ -143,25 +179,36 @@ impl<'a> Solution<'a> {
         let is_asked = |i: u32| some[self.elements.place(i).0];
         let near = self.table.map_rows(|row| {
             let i = row.row() as u32;
-            let seen = row.ids().take(OF_ROW).filter(|id| is_asked(i) && (*id as usize) < n);
+            let seen = row.some(OF_ROW).filter(|id| is_asked(i) && (*id as usize) < n);
             seen.fold([0.0; 2], |[sum, count], id| [sum + middle(i).distance(middle(id)).recip(), count + 1.0])
         })?;
         let mut all = vec![[0.0; 3]; some.len()];
         for (i, [sum, count]) in near.into_iter().enumerate().filter(|(_, near)| near[1] > 0.0) {
             let own = &mut all[self.elements.place(i as u32).0];
-            *own = [own[0] + sum, own[1] + count, (2.0 * self.area[i]).sqrt()];
+            // By as many as each element met: the width of most.
+            *own = [own[0] + sum, own[1] + count, own[2] + count * (2.0 * self.area[i]).sqrt()];
         }
-        some.iter_mut().zip(all).for_each(|(is_wide, [sum, count, width])| *is_wide &= width * sum > WIDE * count);
+        let is_wide = |[sum, count, widths]: [f64; 3]| widths * sum > WIDE * count * count;
+        some.iter_mut().zip(all).for_each(|(some, all)| *some &= is_wide(all));
         Ok(())
     }
 
-    /// By how much the radiosity of each element counts in what is looked at, seen at once or after others. None where rows are not those of the table.
+    /// By how much the radiosity of each element counts in what is looked at, seen at once or after others. None where rows are not those of the table, or elements so many that most are
+    /// triangles as they are, or more than there is room for.
     fn importance(&self, looking: &Looking) -> Result<Option<Vec<f64>>, Error> {
-        if self.matrix.is_some() || self.rays() == 0 {
+        let n = self.elements.len();
+        let has_room = n * size_of::<Row>() + MOST_VECTORS * n * size_of::<f64>() <= self.memory_allowed();
+        if self.matrix.is_some() || self.rays() == 0 || n > FEW || !has_room {
             return Ok(None);
         }
-        let n = self.elements.len();
-        let rows = self.table.map_rows(|row| row.ids().take(OF_ROW).collect::<Vec<u32>>())?;
+        let rows = self.table.map_rows(|row| {
+            let mut own = Row::default();
+            for (id, place) in row.some(OF_ROW).zip(&mut own.ids) {
+                *place = id;
+                own.count += 1;
+            }
+            own
+        })?;
         let mut arriving = self.seen(looking);
         let given = self.reflected();
         let mut importance = vec![0.0; n];
@@ -178,9 +225,10 @@ impl<'a> Solution<'a> {
                     .passed(i)
                     .map_or(0.0, |(other, _)| f64::from(luminance(self.transmittance(other))) * arriving[other]);
                 let share =
-                    (f64::from(luminance(self.reflectance[i])) * arriving[i] + through) / row.len().max(1) as f64;
+                    (f64::from(luminance(self.reflectance[i])) * arriving[i] + through) / row.count.max(1) as f64;
                 if share > 0.0 {
-                    row.iter().filter(|id| (**id as usize) < n).for_each(|id| next[*id as usize] += share);
+                    let met = row.ids[..row.count].iter().filter(|id| (**id as usize) < n);
+                    met.for_each(|id| next[*id as usize] += share);
                 }
             }
             arriving = next;
@@ -258,23 +306,28 @@ mod tests {
         let scene = room();
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let options = SolveOptions { cells: 500, rays: OF_ROW, variation: f64::INFINITY, ..SolveOptions::default() };
-        let solution = Solution::new(&tracer, &options, &()).unwrap();
         let eyes = [DVec3::new(1.0, 0.5, 1.0), DVec3::new(2.0, 2.0, 2.5)];
         let looking = Looking::Eyes(&eyes);
-        let (seen, importance) = (solution.seen(&looking), solution.importance(&looking).unwrap().unwrap());
-        let h = solution.table.rows_mean(&solution.of_elements()).unwrap();
-        let n = seen.len();
-        let sum = |weights: &[f64], light: &dyn Fn(usize) -> f64| (0..n).map(|i| weights[i] * light(i)).sum::<f64>();
-        let x = |i: usize| f64::from(solution.values[i][0]);
-        let reflected = |i: usize| {
-            let passed = solution.sheets.passed(i);
-            let through = passed.map_or(0.0, |(other, tau)| f64::from(tau[0]) * f64::from(h[other][0]));
-            f64::from(solution.reflectance[i][0]) * f64::from(h[i][0]) + through
-        };
-        let [by_light, by_importance] = [sum(&seen, &x), sum(&importance, &|i| x(i) - reflected(i))];
-        assert!((by_importance / by_light - 1.0).abs() < 0.01, "{by_light} {by_importance}");
-        assert!(by_light > 2.0 * sum(&seen, &|i| x(i) - reflected(i)), "light that is seen at once alone");
+        // Of longer rows some ids stand for all.
+        for (rays, within) in [(OF_ROW, 0.01), (16 * OF_ROW, 0.03)] {
+            let options = SolveOptions { cells: 500, rays, variation: f64::INFINITY, ..SolveOptions::default() };
+            let solution = Solution::new(&tracer, &options, &()).unwrap();
+            let (seen, importance) = (solution.seen(&looking), solution.importance(&looking).unwrap().unwrap());
+            let h = solution.table.rows_mean(&solution.of_elements()).unwrap();
+            let n = seen.len();
+            let sum =
+                |weights: &[f64], light: &dyn Fn(usize) -> f64| (0..n).map(|i| weights[i] * light(i)).sum::<f64>();
+            let x = |i: usize| f64::from(solution.values[i][0]);
+            let reflected = |i: usize| {
+                let passed = solution.sheets.passed(i);
+                let through = passed.map_or(0.0, |(other, tau)| f64::from(tau[0]) * f64::from(h[other][0]));
+                f64::from(solution.reflectance[i][0]) * f64::from(h[i][0]) + through
+            };
+            let own = |i: usize| x(i) - reflected(i);
+            let [by_light, by_importance] = [sum(&seen, &x), sum(&importance, &own)];
+            assert!((by_importance / by_light - 1.0).abs() < within, "{rays}: {by_light} {by_importance}");
+            assert!(by_light > 2.0 * sum(&seen, &own), "light that is seen at once alone");
+        }
     }
 
     /// Rooms that are lit all over are solved once.

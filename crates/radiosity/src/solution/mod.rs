@@ -97,7 +97,7 @@ impl<'a> Solution<'a> {
         Solution::begin_scaled(tracer, tracer.scales().to_vec(), options, monitor)
     }
 
-    /// [`Solution::new`] with cells of other widths relative to each other ([`Solution::focus`]).
+    /// [`Solution::new`] with cells of other widths relative to each other ([`Solution::focused`]).
     pub(crate) fn scaled(
         tracer: &'a Tracer<'a>,
         scales: Vec<f32>,
@@ -127,7 +127,7 @@ impl<'a> Solution<'a> {
         let stages = Stages::default();
         let width = cell_width(mesh, &scales, options);
         options.refuse_large_matrices(Elements::count(scene, mesh, width))?;
-        let needed = Solution::memory(tracer, options);
+        let needed = Solution::memory_scaled(tracer, &scales, options);
         if needed > options.memory {
             return Err(memory_error(tracer, Elements::count(scene, mesh, width), needed, options));
         }
@@ -263,21 +263,27 @@ impl<'a> Solution<'a> {
     /// Bytes that the scene, its mesh and tree and a solution with these options take, as far as that is known before the
     /// elements are made: none of them divided. Rays may lie in a file and do not count.
     pub fn memory(tracer: &Tracer, options: &SolveOptions) -> usize {
-        let cells = Elements::count(tracer.scene, tracer.mesh, cell_width(tracer.mesh, tracer.scales(), options));
+        Solution::memory_scaled(tracer, tracer.scales(), options)
+    }
+
+    fn memory_scaled(tracer: &Tracer, scales: &[f32], options: &SolveOptions) -> usize {
+        let cells = Elements::count(tracer.scene, tracer.mesh, cell_width(tracer.mesh, scales, options));
         let solution = footprint::solution(tracer, cells, Luminaires::most(tracer.scene));
         solution.saturating_add(options.stored(cells, cells))
     }
 
-    /// Whether the memory holds what these options ask for, as far as that is known before the elements are made.
-    pub(crate) fn fits(tracer: &Tracer, options: &SolveOptions) -> bool {
-        let (scene, mesh) = (tracer.scene, tracer.mesh);
-        let elements = Elements::count(scene, mesh, cell_width(mesh, tracer.scales(), options));
-        Solution::memory(tracer, options) <= options.memory && options.solver.matrix_bytes(elements) <= options.memory
+    /// Whether the memory holds what these options ask for with cells of such widths as these, as far as that is known before the elements are made.
+    pub(crate) fn has_room_for(&self, options: &SolveOptions) -> bool {
+        let (tracer, scales) = (self.tracer, &self.scales);
+        let elements = Elements::count(tracer.scene, tracer.mesh, cell_width(tracer.mesh, scales, options));
+        Solution::memory_scaled(tracer, scales, options) <= options.memory
+            && options.solver.matrix_bytes(elements) <= options.memory
     }
 
     /// Width of the narrowest cells, metres.
     pub fn narrowest(&self) -> f64 {
-        self.element_size * f64::from(self.scales.iter().copied().fold(1.0, f32::min))
+        let scales = if self.options.element_size.is_some() { &[][..] } else { &self.scales };
+        self.element_size * f64::from(scales.iter().copied().fold(1.0, f32::min))
     }
 
     /// The tracer that the solution was made with.
