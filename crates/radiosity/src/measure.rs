@@ -247,10 +247,8 @@ pub fn measure(
     solve.variation = solve.variation.min(VARIATION * begun_for / crowd.cells.sqrt());
     solve.suit_method();
     solve.fit(tracer, monitor);
-    let mut first = match monitor.deadline() {
-        Some(_) => FEWEST,
-        None => std::array::from_fn(|k| rays_for(options.error, FIRST_RAYS[k], FEWEST[k], MOST_FIRST)),
-    };
+    let usual_first = std::array::from_fn(|k| rays_for(options.error, FIRST_RAYS[k], FEWEST[k], MOST_FIRST));
+    let mut first = if monitor.deadline().is_some() { FEWEST } else { usual_first };
     monitor.round(1, most_rounds);
     let mut solving = Instant::now();
     let mut solution = Solution::focused(tracer, &solve, &Looking::Places(&places), (&stages, monitor))?;
@@ -276,7 +274,15 @@ pub fn measure(
         let begun = Instant::now();
         // Where the first rays found no light they tell no noise either.
         let size = root_mean_square(&light.irradiance()).max(f64::from(f32::MIN_POSITIVE));
-        let lacks_time = !quieten(&mut light, &solution, (first[0], noise_asked * size), monitor)?;
+        let noise = noise_asked * size;
+        let mut lacks_time = !quieten(&mut light, &solution, (first[0], noise), monitor)?;
+        // Few rays that missed what is bright tell no noise. Where a limit leaves time, points have as many as they begin with where there is none.
+        let more = crowd.first(usual_first)[0].saturating_sub(light.fewest());
+        let takes = light.seconds * more as f64 / light.rays()[0].max(1) as f64;
+        if !lacks_time && more > 0 && has_time(monitor, 1.5 * takes) {
+            light.add(&solution, more, monitor)?;
+            lacks_time = !quieten(&mut light, &solution, (first[0], noise), monitor)?;
+        }
         let mut irradiance = vec![[0.0; 3]; places.len()];
         order.iter().zip(light.irradiance()).for_each(|(&i, light)| irradiance[i] = light);
         let watched: Vec<Bands> = watched.iter().map(|&i| irradiance[i]).collect();

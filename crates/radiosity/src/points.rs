@@ -158,9 +158,16 @@ impl<A: Asked> Light<A> {
         let allowed = noise.powi(2) - of_direct.powi(2).min(0.5 * noise.powi(2));
         let wanted = (had as f64 * UNTOLD * of_gathered.powi(2) / allowed).min(most as f64) as usize;
         let more = wanted.next_power_of_two().min(most).saturating_sub(had);
-        if more == 0 {
-            return Ok(());
-        }
+        self.seconds += began.elapsed().as_secs_f64();
+        if more == 0 { Ok(()) } else { self.add(solution, more, monitor) }
+    }
+
+    /// Sends so many more gather rays, from all alike.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`].
+    pub fn add(&mut self, solution: &Solution, more: usize, monitor: &dyn Monitor) -> Result<(), Error> {
+        let began = Instant::now();
         self.sets += 1;
         let all: Vec<usize> = (0..self.asked.len()).collect();
         let halves = solution.halves_of(&self.asked.some(solution, &all, self.sets), more, monitor)?;
@@ -168,6 +175,11 @@ impl<A: Asked> Light<A> {
         self.share();
         self.seconds += began.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Gather rays of those that have fewest.
+    pub fn fewest(&self) -> usize {
+        self.gathered.rays.iter().copied().min().unwrap_or(0) as usize
     }
 
     /// Sends more rays, so that no more `noise` is left in all, lx; up to `most` times as many as there are, if that is said. Whether
