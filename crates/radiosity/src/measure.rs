@@ -252,7 +252,7 @@ pub fn measure(
     monitor.round(1, most_rounds);
     let mut solving = Instant::now();
     let mut solution = Solution::focused(tracer, &solve, &Looking::Places(&places), (&stages, monitor))?;
-    let least_rays = std::mem::replace(&mut solve, solution.options_asked()).rays;
+    let least_rays = std::mem::replace(&mut solve, solution.options).rays;
     let mut solution_takes = solving.elapsed().as_secs_f64();
 
     // The referee looks at every n-th point.

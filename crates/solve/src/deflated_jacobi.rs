@@ -15,7 +15,7 @@ use crate::{Go, Info, Params, Response, Sheets, SolveError, Space, Transport};
 use std::collections::BTreeMap;
 
 /// Solves B = E + R F B in place; `b` holds the start (warm or zero) and the result. `step` sees each iterate. This is
-/// the solver `deflated-jacobi` of the table; the textbook's is [`crate::jacobi`].
+/// the solver `deflated-jacobi` of the table; the textbook's is [`crate::jacobi`]. Up to a work of 64 it goes on where the residual is small enough but dim unknowns have not settled.
 ///
 /// # Errors
 /// [`SolveError::NotConverged`] with the last iterate left in `b`; [`SolveError::Stopped`] if `step` says so.

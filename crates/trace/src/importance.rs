@@ -9,7 +9,6 @@ use crate::{Found, Place, Tracer};
 use glam::{DVec2, DVec3, Vec2};
 use radiosity_scene::{Mesh, Side};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 /// Walks from all eyes together, and the surfaces that each visits: enough to come to the room beside.
 const WALKS: usize = 8192;
@@ -95,10 +94,7 @@ fn is_flat(mesh: &Mesh, triangle: usize) -> bool {
 fn visited(tracer: &Tracer, eye: DVec3, walk: u64) -> impl Iterator<Item = u32> {
     let mesh: &Mesh = tracer.mesh;
     let mut random = Random::new(PATHS ^ walk);
-    let height = 1.0 - 2.0 * random.next_unit();
-    let (sine, cosine) = (TAU * random.next_unit()).sin_cos();
-    let across = (1.0 - height * height).sqrt();
-    let mut ray = tracer.free_ray(eye, DVec3::new(across * cosine, across * sine, height));
+    let mut ray = tracer.free_ray(eye, random.next_direction());
     let mut triangles = Vec::with_capacity(VISITED);
     while let Found::Surface { triangle, uv, side, .. } = tracer.first(&ray, random.next_bits()) {
         triangles.push(triangle);

@@ -171,6 +171,14 @@ impl Random {
         f64::from(self.bits()) * (1.0 / 4_294_967_296.0)
     }
 
+    /// The next direction, all around alike.
+    pub fn next_direction(&mut self) -> DVec3 {
+        let height = 1.0 - 2.0 * self.next_unit();
+        let (sine, cosine) = (std::f64::consts::TAU * self.next_unit()).sin_cos();
+        let across = (1.0 - height * height).sqrt();
+        DVec3::new(across * cosine, across * sine, height)
+    }
+
     /// The next 32 random bits.
     pub fn next_bits(&mut self) -> u32 {
         self.bits()

@@ -4,10 +4,10 @@
 //! within the width of a cell: constants carry it on too far, and a room behind a window of 20 × 120 cm in a wall of 80 cm was 10 to 25 % too bright, whatever
 //! number of rays was sent. So a solution is asked what of the light that is looked at was on each surface: its radiosity by its importance
 //! (Smits, Arvo and Salesin 1992, "An importance-driven radiosity algorithm", §3), which is light that goes backwards through the same rows. A surface that matters more than
-//! four times as much as it has cells has as many of them, in the next solution, as a quarter of that.
+//! four times as much as it has cells has as many of them, in the next solution, as a quarter of that. There is one only where cells of such surfaces are wide beside the distance of what they see: in an
+//! open room all is as it ought to be.
 
-use super::FEW;
-use super::{Solution, SolveOptions};
+use super::{FEW, Solution, SolveOptions};
 use crate::Error;
 use crate::monitor::{Monitor, Stages, has_time};
 use glam::DVec3;
@@ -16,7 +16,6 @@ use radiosity_trace::sampling::{Random, cosine_direction, frame};
 use radiosity_trace::{Place, Tracer, narrowed};
 use radiosity_transport::IdSpace;
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 use std::time::Instant;
 
 /// Rays that look for what is seen, and the streams of numbers that they use.
@@ -121,11 +120,6 @@ impl<'a> Solution<'a> {
             };
         }
         Ok(solution)
-    }
-
-    /// How it was to be solved.
-    pub(crate) fn options_asked(&self) -> SolveOptions {
-        self.options
     }
 
     /// Rays per cell that another solution of so many cells is worth: as many as there may be, but where cells are narrow already because light comes by few places, and have many.
@@ -255,10 +249,7 @@ impl<'a> Solution<'a> {
                     (tracer.ray(place, direction, f64::INFINITY), direction)
                 }
                 Looking::Eyes(eyes) => {
-                    let height = 1.0 - 2.0 * random.next_unit();
-                    let (sine, cosine) = (TAU * random.next_unit()).sin_cos();
-                    let across = (1.0 - height * height).sqrt();
-                    let direction = DVec3::new(across * cosine, across * sine, height);
+                    let direction = random.next_direction();
                     (tracer.free_ray(*eyes.get(k * eyes.len() / RAYS)?, direction), direction)
                 }
             };
