@@ -5,8 +5,8 @@
 //! iterate before, ω₁ = 1, ω₂ = 2/(2 − σ²), ω' = 1/(1 − σ² ω/4). With the spectrum of R F within ±σ a white room takes the
 //! square root of the sweeps. What is beyond σ converges too, only slower. It multiplies by polynomials of R F, so light never
 //! gets where no ray goes: a sealed dark room stays black to the last bit. The start and the rule for the end are
-//! fixed, and so is every order of summation: the same rows give the same bits. Each column ends by its own residual and stays as
-//! it was then, so that its bits do not depend on what is solved beside it.
+//! fixed, and so is every order of summation: the same rows give the same bits. Each column ends by its own residual and by what
+//! sweeps still change of its dim places, and stays as it was then, so that its bits do not depend on what is solved beside it.
 
 use radiosity_transport::live::{Lanes, Live};
 use rayon::prelude::*;
@@ -122,6 +122,19 @@ const SUM: usize = 1024;
 /// Sweeps after which a solve ends in any case.
 const MOST_SWEEPS: u32 = 300;
 
+/// What is left to change of each element, relative to itself, over the tolerance: at most this in the mean of fourth powers. The
+/// residual is that of the brightest: rooms of a thousandth of the light outside would end where what is outside does.
+const SETTLED: f64 = 30.0;
+
+/// Sweeps after which the residual is enough.
+const MOST_LOCAL: u32 = 64;
+
+/// The slowest that changes are believed to fall from sweep to sweep.
+const SLOWEST: f64 = 0.95;
+
+/// Light beside the brightest below which nobody asks.
+const DARK: f32 = 1e-6;
+
 /// Columns on their way: up to `W`/3 of them, three bands each.
 #[derive(Clone, Debug)]
 pub struct Solve<const W: usize> {
@@ -136,7 +149,18 @@ pub struct Solve<const W: usize> {
     pub h: Vec<Lanes<W>>,
     /// ‖G(Y) − Y‖/‖Y‖ of each column at its last sweep, weighted by area; beyond the last column nothing.
     residuals: [f64; MOST_TOGETHER],
+    /// What the last sweep changed of each element of a column, relative to itself, in the mean of fourth powers.
+    changes: [f64; MOST_TOGETHER],
     has_ended: [bool; MOST_TOGETHER],
+}
+
+/// What a sweep changed of a column: squares of the change and of all, weighted by area; fourth powers of what changed of each
+/// element relative to itself.
+#[derive(Clone, Copy, Default)]
+struct Change {
+    squares: f64,
+    whole: f64,
+    relative: f64,
 }
 
 /// Columns that are solved together at most.
@@ -163,6 +187,7 @@ impl<const W: usize> Solve<W> {
             sweeps: 0,
             h,
             residuals: [f64::INFINITY; MOST_TOGETHER],
+            changes: [f64::INFINITY; MOST_TOGETHER],
             has_ended: [false; MOST_TOGETHER],
         }
     }
@@ -180,34 +205,18 @@ impl<const W: usize> Solve<W> {
             }
         });
         answer.respond(&self.e, &self.h, &mut self.gathered);
-        let sums: Vec<[[f64; 2]; MOST_TOGETHER]> = self
-            .gathered
-            .par_chunks(SUM)
-            .zip(self.y.par_chunks(SUM))
-            .zip(answer.area.par_chunks(SUM))
-            .map(|((new, old), area)| {
-                let mut sums = [[0f64; 2]; MOST_TOGETHER];
-                for ((new, old), area) in new.iter().zip(old).zip(area) {
-                    for (column, sum) in sums.iter_mut().enumerate().take(columns) {
-                        let mut own = [0f32; 2];
-                        for k in 3 * column..3 * column + 3 {
-                            own[0] += (new.0[k] - old.0[k]).powi(2);
-                            own[1] += old.0[k].powi(2);
-                        }
-                        sum[0] += f64::from(*area) * f64::from(own[0]);
-                        sum[1] += f64::from(*area) * f64::from(own[1]);
-                    }
-                }
-                sums
-            })
-            .collect();
+        let changes = self.change(answer);
         self.sweeps += 1;
         for column in (0..columns).filter(|column| is_open[3 * column]) {
-            let add = |sum: [f64; 2], own: &[[f64; 2]; MOST_TOGETHER]| [0, 1].map(|k| sum[k] + own[column][k]);
-            let [change, whole] = sums.iter().fold([0f64; 2], add);
-            let residual = if change > 0.0 { (change / whole.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 };
-            self.residuals[column] = residual;
-            self.has_ended[column] = residual <= tolerance || self.sweeps >= MOST_SWEEPS;
+            let Change { squares, whole, relative } = changes[column];
+            let residual = if squares > 0.0 { (squares / whole.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 };
+            // Changes that fall by a factor q from sweep to sweep come to q/(1 − q) times the last one.
+            let now = (relative / self.y.len().max(1) as f64).powf(0.25);
+            let factor = (now / self.changes[column]).clamp(0.0, SLOWEST);
+            let left = now * (factor / (1.0 - factor)).max(1.0);
+            (self.residuals[column], self.changes[column]) = (residual, now);
+            let is_settled = left <= SETTLED * tolerance || self.sweeps >= MOST_LOCAL;
+            self.has_ended[column] = (residual <= tolerance && is_settled) || self.sweeps >= MOST_SWEEPS;
         }
         if self.has_ended[..columns].iter().all(|has_ended| *has_ended) {
             return true;
@@ -230,6 +239,46 @@ impl<const W: usize> Solve<W> {
         false
     }
 
+    /// What a sweep changed of each column, given what it made.
+    fn change(&self, answer: &Answer) -> [Change; MOST_TOGETHER] {
+        let columns = W / 3;
+        let larger = |a: [f32; W], b: [f32; W]| std::array::from_fn(|k| a[k].max(b[k]));
+        let brightest = self.gathered.par_chunks(SUM).map(|new| new.iter().fold([0.0; W], |most, y| larger(most, y.0)));
+        let dark = brightest.reduce(|| [0.0; W], larger).map(|most| (DARK * most).max(f32::MIN_POSITIVE));
+        let sums: Vec<[Change; MOST_TOGETHER]> = self
+            .gathered
+            .par_chunks(SUM)
+            .zip(self.y.par_chunks(SUM))
+            .zip(answer.area.par_chunks(SUM))
+            .map(|((new, old), area)| {
+                let mut sums = [Change::default(); MOST_TOGETHER];
+                for ((new, old), area) in new.iter().zip(old).zip(area) {
+                    for (column, sum) in sums.iter_mut().enumerate().take(columns) {
+                        let (mut own, mut relative) = ([0f32; 2], 0f32);
+                        for k in 3 * column..3 * column + 3 {
+                            let change = new.0[k] - old.0[k];
+                            own[0] += change.powi(2);
+                            own[1] += old.0[k].powi(2);
+                            relative += (change / new.0[k].abs().max(dark[k])).powi(4);
+                        }
+                        sum.squares += f64::from(*area) * f64::from(own[0]);
+                        sum.whole += f64::from(*area) * f64::from(own[1]);
+                        sum.relative += f64::from(relative) / 3.0;
+                    }
+                }
+                sums
+            })
+            .collect();
+        sums.iter().fold([Change::default(); MOST_TOGETHER], |mut sums, own| {
+            for (sum, own) in sums.iter_mut().zip(own) {
+                sum.squares += own.squares;
+                sum.whole += own.whole;
+                sum.relative += own.relative;
+            }
+            sums
+        })
+    }
+
     /// The largest residual of a column.
     pub fn residual(&self) -> f64 {
         self.residuals[..W / 3].iter().copied().fold(0.0, f64::max)
@@ -250,6 +299,7 @@ impl<const W: usize> Solve<W> {
 mod tests {
     use super::*;
     use crate::session::{Session, SessionOptions};
+    use crate::{Material, Scene, Sky};
     use std::time::Duration;
 
     /// A column has the bits that it has alone, whatever is solved beside it and wherever it lies: dark, even, or so uneven
@@ -280,6 +330,48 @@ mod tests {
                 assert!(light == alone[*column].0, "column {column} among {columns:?}");
             }
         }
+    }
+
+    /// A room behind a small window, with ground before it that has all of the sky: its light is carried on as far as it
+    /// goes, though what that changes is next to nothing of the light on the ground.
+    #[test]
+    fn a_dim_room_is_solved_as_far_as_what_is_outside() {
+        use glam::DVec3;
+        let gray = |rho: f32| Material { base_color: [rho, rho, rho, 1.0], ..Material::default() };
+        let sky = Sky::Overcast { horizontal: [10_000.0; 3] };
+        let mut scene = Scene { sky, materials: vec![gray(0.8), gray(0.3)], ..Scene::default() };
+        let mut quad = |object: &str, material, corners: [[f64; 3]; 4]| {
+            scene.add_quad(object, material, corners.map(DVec3::from));
+        };
+        quad("room", 0, [[0., 0., 0.], [0., 0., 4.], [4., 0., 4.], [4., 0., 0.]]);
+        quad("room", 0, [[0., 3., 0.], [4., 3., 0.], [4., 3., 4.], [0., 3., 4.]]);
+        quad("room", 0, [[0., 0., 0.], [0., 3., 0.], [0., 3., 4.], [0., 0., 4.]]);
+        quad("room", 0, [[4., 0., 0.], [4., 0., 4.], [4., 3., 4.], [4., 3., 0.]]);
+        quad("room", 0, [[0., 0., 4.], [0., 3., 4.], [4., 3., 4.], [4., 0., 4.]]);
+        for [x, y] in [[[0., 1.9], [0., 3.]], [[2.1, 4.], [0., 3.]], [[1.9, 2.1], [0., 1.4]], [[1.9, 2.1], [1.6, 3.]]] {
+            for [x, z] in [[x, [0., 0.]], [[x[1], x[0]], [-0.1, -0.1]]] {
+                let z = z[0];
+                quad("room", 0, [[x[0], y[0], z], [x[1], y[0], z], [x[1], y[1], z], [x[0], y[1], z]]);
+            }
+        }
+        quad("ground", 1, [[-6., -0.01, -12.], [-6., -0.01, -0.1], [10., -0.01, -0.1], [10., -0.01, -12.]]);
+        let options = SessionOptions { element_size: Some(0.25), rays: 1024, ..SessionOptions::default() };
+        let mut session = Session::new(scene, &options).unwrap();
+        while !session.step(Duration::from_millis(3)).is_done {}
+        let solve = |tolerance: f64| {
+            let mut solve = Solve::new(&session.answer, session.emission(), session.direct_light(), None);
+            while !solve.sweep(&session.live, &session.answer, 1024, tolerance) {}
+            solve.h
+        };
+        let (found, exact) = (solve(1e-4), solve(0.0));
+        let bodies = session.live.world().bodies.iter();
+        let lit = bodies
+            .flat_map(|body| body.first..body.dark())
+            .map(|id| (found[id as usize].0[0], exact[id as usize].0[0]));
+        let dim: Vec<_> = lit.filter(|(_, exact)| (1.0..100.0).contains(exact)).collect();
+        assert!(dim.len() > 100, "{} elements are no dim room", dim.len());
+        let [found, exact] = dim.iter().fold([0.0; 2], |sum, own| [sum[0] + own.0, sum[1] + own.1]);
+        assert!((found / exact - 1.0).abs() <= 0.01, "{found} for {exact}");
     }
 
     /// Columns, and how many sweeps they took together.
