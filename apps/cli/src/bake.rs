@@ -276,7 +276,7 @@ fn tell(report: &Report, delta_e: Option<f64>, global: &Global, progress: &Progr
         let event = ResultEvent { event: "result", report };
         return print(&serde_json::to_string(&event).map_err(Failure::work)?);
     }
-    progress.say(&report.error.line());
+    report.error.tell(progress);
     if let Some(asked) = delta_e {
         progress.say(&views::nearness(&report.solution.displayed, asked));
     }

@@ -48,6 +48,10 @@ pub const ABOUT: &[(&str, &str)] = &[
     ("error.upper_95_one_sided", UPPER),
     ("error.lower_95_one_sided", LOWER),
     ("error.bias", BIAS),
+    (
+        "error.dim",
+        "places with less than a tenth of the root mean square illuminance, which hardly count in the error: below (lx), their share of all places, and the error there, relative to what is there; null where they are few, or where paths tell nothing",
+    ),
     ("error.solution_estimated", SOLUTION),
     ("illuminance.low", "lx; 95 % of the area that any light reaches gets more"),
     ("illuminance.mean", "lx; by area, over all exposed surfaces"),

@@ -142,7 +142,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         });
         return print(&result.to_string());
     }
-    progress.say(&error.line());
+    error.tell(progress);
     progress.say(&levels.to_string());
     if let Some(wrote) = wrote {
         progress.say(&wrote);

@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         });
         return print(&result.to_string());
     }
-    progress.say(&error.line());
+    error.tell(progress);
     if let Some(asked) = arguments.solve.delta_e {
         progress.say(&views::nearness(&shown, asked));
     }

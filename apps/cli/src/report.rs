@@ -2,9 +2,11 @@
 
 use crate::illuminance::Illuminance;
 use crate::progress::Progress;
-use crate::{Failure, faults, figures, input};
+use crate::{Failure, faults, figures, input, numbers};
 use radiosity::measure::{Round, is_stalled};
-use radiosity::{Audit, Baked, Balance, Faults, Lightmap, Material, Scene, Shown, Sky, View, WrittenRound, counted};
+use radiosity::{
+    Audit, Baked, Balance, Dim, Faults, Lightmap, Material, Scene, Shown, Sky, View, WrittenRound, counted,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -95,6 +97,8 @@ pub struct ErrorReport {
     pub paths_per_estimate: u32,
     /// Mean illuminance at the points by the referee, lx.
     pub mean_illuminance: f64,
+    /// What is said of dim places alone, which hardly count in the error; null where they are few.
+    pub dim: Option<Dim>,
     /// Seed of the audit.
     pub seed: u64,
     /// The audit's estimate for the solution itself, before it is written into texels or vertices.
@@ -128,6 +132,7 @@ impl ErrorReport {
             points: audit.points,
             paths_per_estimate: audit.paths,
             mean_illuminance: audit.mean_illuminance,
+            dim: audit.dim.clone(),
             seed: solve.seed,
             solution_estimated: solution.error,
             solution_upper_95_one_sided: solution.upper,
@@ -150,6 +155,27 @@ impl ErrorReport {
         !self.achieved && self.solution_upper_95_one_sided <= self.asked
     }
 
+    /// Says what was reached, and how far that goes.
+    pub fn tell(&self, progress: &Progress) {
+        progress.say(&self.line());
+        self.dimly().iter().for_each(|note| progress.say(&format!("note: {note}")));
+    }
+
+    /// What is said of dim places where they are much of what there is.
+    pub fn dimly(&self) -> Option<String> {
+        let dim = self.dim.as_ref().filter(|dim| dim.share >= MUCH)?;
+        let found = match dim.upper {
+            upper if upper.is_finite() => {
+                format!("there the audit says {}, at most {}", percent(dim.error), percent(upper))
+            }
+            _ => "there the audit's paths tell nothing: measure points there".to_owned(),
+        };
+        let (share, below) = (100.0 * dim.share, numbers::rough(dim.below));
+        Some(format!(
+            "{share:.0} % of places have less than {below} lx, a tenth of what this error is relative to, and hardly count in it; {found}"
+        ))
+    }
+
     /// In a line.
     pub fn line(&self) -> String {
         if self.points == 0 {
@@ -159,7 +185,6 @@ impl ErrorReport {
             let places = counted(self.points, "place", "places");
             return format!("the audit finds no light at any of {places}, and the answer has none");
         }
-        let percent = |x: f64| format!("{:.3} %", 100.0 * x);
         let verdict = match (self.achieved, self.out_of_time) {
             (true, _) => "reached",
             (false, true) => "NOT reached in the time given",
@@ -196,6 +221,13 @@ impl ErrorReport {
         }
         line
     }
+}
+
+/// Part of all places that dim ones are at least where that is said beside the verdict.
+const MUCH: f64 = 0.2;
+
+fn percent(x: f64) -> String {
+    format!("{:.3} %", 100.0 * x)
 }
 
 /// What is said of a solution.
@@ -444,6 +476,7 @@ mod tests {
             points: 100,
             paths_per_estimate: 48,
             mean_illuminance: 10.0,
+            dim: None,
             seed: 1,
             solution_estimated: estimated,
             solution_upper_95_one_sided: 0.02,
@@ -457,6 +490,20 @@ mod tests {
         let [unseen, seen] = [0.0, 0.01].map(|estimated| report(estimated).line());
         assert!(unseen.contains("reached; audit cannot tell the answer from the truth, at most 2.000 %"), "{unseen}");
         assert!(seen.contains("reached; audit says 1.000 %, at most 2.000 %"), "{seen}");
+    }
+
+    /// Where much is dim, a verdict of the rest is not taken for one of it.
+    #[test]
+    fn dim_places_are_told_of_where_they_are_much() {
+        let dimly = |share: f64, upper: f64| {
+            let dim = Some(Dim { below: 484.1, share, error: 0.5 * upper, upper });
+            ErrorReport { dim, ..report(0.01) }.dimly()
+        };
+        let told = dimly(0.44, 0.2).unwrap();
+        let begins = "44 % of places have less than 484 lx, a tenth of what this error is relative to";
+        assert!(told.starts_with(begins) && told.ends_with("the audit says 10.000 %, at most 20.000 %"), "{told}");
+        assert!(dimly(0.44, f64::INFINITY).unwrap().ends_with("paths tell nothing: measure points there"));
+        assert_eq!((dimly(0.1, 0.2), report(0.01).dimly()), (None, None));
     }
 
     /// What would not help is no advice.

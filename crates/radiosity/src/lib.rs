@@ -85,4 +85,4 @@ pub use radiosity_solve as solve;
 pub use radiosity_trace::{Found, Place, Tracer};
 pub use radiosity_transport as transport;
 pub use radiosity_view as view;
-pub use radiosity_view::{Audit, Auditor, Field, Picture, Referee};
+pub use radiosity_view::{Audit, Auditor, Dim, Field, Picture, Referee};

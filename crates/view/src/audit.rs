@@ -68,7 +68,28 @@ pub struct Audit {
     pub mean_illuminance: f64,
     /// Further places at which what is handed out was compared with the answer that it was read from.
     pub compared: usize,
+    /// What is said of dim places alone, which hardly count in the error of all; none where they are few.
+    pub dim: Option<Dim>,
 }
+
+/// What an audit says of places with less than a [`DIM`]th of the root mean square light, as answered.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Dim {
+    /// Illuminance below which they are, lux.
+    pub below: f64,
+    /// Part of all places that they are.
+    pub share: f64,
+    /// Estimated relative L2 error of irradiance there, relative to what is there; infinite where paths tell nothing.
+    pub error: f64,
+    /// One-sided 95 % upper bound of that.
+    pub upper: f64,
+}
+
+/// How many times less light than the root mean square makes places dim.
+pub const DIM: f64 = 10.0;
+
+/// Part of all places that dim ones are at least where they are told of.
+const FEWEST_DIM: f64 = 0.05;
 
 impl Audit {
     /// Whether the error is larger than `target` beyond doubt: by three standard errors of its square. A few bright paths of
@@ -198,7 +219,7 @@ impl<'a> Auditor<'a> {
         if self.paths == 0 || h.is_empty() {
             return Audit { upper: f64::INFINITY, ..Audit::default() };
         }
-        judge((&self.estimates, self.looks), h, None, self.paths)
+        judge_with_dim((&self.estimates, self.looks), h, None, self.paths)
     }
 
     /// Judges light `read` from an answer `h` and handed out, both at each place, by what it differs from that answer at
@@ -208,7 +229,7 @@ impl<'a> Auditor<'a> {
         if self.paths == 0 || h.is_empty() || squares.len() < FEWEST_PAIRS {
             return self.judge(read);
         }
-        judge((&self.estimates, self.looks), read, Some((h, squares)), self.paths)
+        judge_with_dim((&self.estimates, self.looks), read, Some((h, squares)), self.paths)
     }
 }
 
@@ -267,6 +288,43 @@ impl Noise {
         let (estimate, half) = (estimate.max(0.0), 0.5 * ONE_SIDED_95.powi(2) * self.growing);
         estimate + half + half.hypot(ONE_SIDED_95 * self.at(estimate))
     }
+}
+
+/// Judges all places, and those alone that are dim by what was answered, which is independent of what it is judged by.
+fn judge_with_dim(estimates: (&[f64], usize), m: &[Bands], from: Option<(&[Bands], &[[f64; 2]])>, paths: u32) -> Audit {
+    Audit { dim: judge_dim(estimates, m, from, paths), ..judge(estimates, m, from, paths) }
+}
+
+/// Judges dim places, unless they are few or black.
+fn judge_dim(
+    (estimates, looks): (&[f64], usize),
+    m: &[Bands],
+    from: Option<(&[Bands], &[[f64; 2]])>,
+    paths: u32,
+) -> Option<Dim> {
+    let answered = from.map_or(m, |(h, _)| h);
+    let light: Vec<f64> = answered.iter().map(|h| f64::from(luminance(*h))).collect();
+    let below = (light.iter().map(|h| h * h).sum::<f64>() / light.len() as f64).sqrt() / DIM;
+    let dim: Vec<usize> = (0..light.len()).filter(|i| light[*i] < below).collect();
+    let share = dim.len() as f64 / light.len() as f64;
+    let own: Vec<f64> = dim.iter().flat_map(|i| &estimates[looks * i..looks * (i + 1)]).copied().collect();
+    let is_black = own.iter().all(|a| *a == 0.0) && dim.iter().all(|i| luminance(m[*i]) == 0.0);
+    if share < FEWEST_DIM || own.len() < 2 * FEWEST_PAIRS || is_black {
+        return None;
+    }
+    let at = |of: &[Bands]| dim.iter().map(|i| of[*i]).collect::<Vec<Bands>>();
+    let (m, h) = (at(m), at(answered));
+    let squares = from.map(|(_, squares)| squares.iter().filter(|s| s[1] < below * below).copied().collect::<Vec<_>>());
+    let Audit { error, upper, .. } =
+        judge((&own, looks), &m, squares.as_ref().map(|squares| (&h[..], &squares[..])), paths);
+    // Estimates of what there is may come to next to nothing, or less, by their noise.
+    let is_told = upper <= 1.0;
+    Some(Dim {
+        below,
+        share,
+        error: if is_told { error } else { f64::INFINITY },
+        upper: if is_told { upper } else { f64::INFINITY },
+    })
 }
 
 /// Judges by so many estimates of each place: two, by what they scatter over places, or more, by what they scatter at each.
@@ -328,6 +386,7 @@ fn judge((estimates, looks): (&[f64], usize), m: &[Bands], from: Option<(&[Bands
         of_paths,
         mean_illuminance: level,
         compared: squares.len(),
+        dim: None,
     }
 }
 
@@ -337,6 +396,36 @@ mod tests {
     use glam::DVec3;
     use radiosity_scene::{Material, Mesh, Scene};
     use radiosity_trace::sampling::Random;
+
+    /// Of dim places it is told how far off they are in their own light, which says next to nothing of all; nothing where they are few or black, and no
+    /// number where paths tell none.
+    #[test]
+    fn dim_places_are_judged_by_themselves() {
+        let dim = |share: f64, light: [f64; 2], estimates: [f64; 2]| {
+            let is_dim = |k: usize| (k as f64) < share * 1000.0;
+            let m: Vec<Bands> = (0..1000).map(|k| [light[usize::from(!is_dim(k))] as f32; 3]).collect();
+            let estimates: Vec<f64> =
+                (0..2000).map(|k| if is_dim(k / 2) { estimates[k % 2] } else { 1000.0 }).collect();
+            judge_with_dim((&estimates, 2), &m, None, 1)
+        };
+        let audit = dim(0.4, [1.1, 1000.0], [1.0, 1.0]);
+        assert!(audit.upper < 2e-4, "{audit:?}");
+        let told = audit.dim.unwrap();
+        assert!((told.error - 0.1).abs() < 1e-6 && (told.share - 0.4).abs() < 1e-9 && told.upper >= told.error);
+        assert!((told.below - 100.0 * 0.6f64.sqrt()).abs() < 0.01, "{told:?}");
+        assert_eq!(dim(0.4, [1.1, 1000.0], [0.0, 9.0]).dim.map(|dim| dim.upper), Some(f64::INFINITY));
+        for audit in
+            [dim(0.02, [1.1, 1000.0], [1.0; 2]), dim(0.4, [0.0, 1000.0], [0.0; 2]), dim(0.4, [200.0, 1e3], [200.; 2])]
+        {
+            assert_eq!(audit.dim, None);
+        }
+        // Light read back differs from the answer in dim places at further places, too.
+        let h: Vec<Bands> = (0..1000).map(|k| [if k < 400 { 1.0 } else { 1000.0 }; 3]).collect();
+        let estimates: Vec<f64> = h.iter().flat_map(|h| [f64::from(h[0]); 2]).collect();
+        let squares: Vec<[f64; 2]> = (0..500).map(|k| if k < 200 { [0.04, 1.0] } else { [0.0, 1e6] }).collect();
+        let told = judge_with_dim((&estimates, 2), &h, Some((&h, &squares)), 1).dim.unwrap();
+        assert!((told.error - 0.2).abs() < 1e-6, "{told:?}");
+    }
 
     /// A few bright paths of the referee are no proof that an answer is wrong; that all places say so is.
     #[test]

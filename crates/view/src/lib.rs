@@ -10,7 +10,7 @@ pub mod pool;
 pub mod reconstruct;
 pub mod referee;
 
-pub use audit::{Audit, Auditor};
+pub use audit::{Audit, Auditor, Dim};
 pub use picture::{Picture, ViewRays};
 pub use pool::Pooled;
 pub use reconstruct::{FLAT, Field, Finding, Planes, Shared, shared_corner};

@@ -4,7 +4,7 @@ use super::*;
 use crate::illuminance::{Class, Illuminance, SurfaceLight};
 use crate::report::{LightmapReport, SceneReport, SolutionReport, StageReport, TimeReport};
 use radiosity::measure::Round;
-use radiosity::{Balance, Faults, Shown};
+use radiosity::{Balance, Dim, Faults, Shown};
 
 fn example(rounds: usize) -> Report {
     let round = |i: usize| {
@@ -48,6 +48,7 @@ fn example(rounds: usize) -> Report {
             points: last.map_or(0, |_| 1000),
             paths_per_estimate: 256,
             mean_illuminance: 412.0,
+            dim: Some(Dim { below: 41.0, share: 0.3, error: 0.1, upper: 0.2 }),
             seed: 17,
             solution_estimated: 0.9 * estimated,
             solution_upper_95_one_sided: 0.9 * upper,
@@ -209,4 +210,6 @@ fn verdict_follows_the_bound() {
     assert!(!page(&report, &[]).contains("NOT reached"));
     report.error.upper_95_one_sided = f64::INFINITY;
     assert!(page(&report, &[]).contains("NOT reached"), "a flag without a bound convinces nobody");
+    let dimly = "30 % of places have less than 41 lx, a tenth of what this error is relative to";
+    assert!(page(&report, &[]).contains(dimly));
 }

@@ -255,11 +255,11 @@ impl<const W: usize> Solve<W> {
                 for ((new, old), area) in new.iter().zip(old).zip(area) {
                     for (column, sum) in sums.iter_mut().enumerate().take(columns) {
                         let (mut own, mut relative) = ([0f32; 2], 0f32);
-                        for k in 3 * column..3 * column + 3 {
+                        for (k, dark) in dark.iter().enumerate().skip(3 * column).take(3) {
                             let change = new.0[k] - old.0[k];
                             own[0] += change.powi(2);
                             own[1] += old.0[k].powi(2);
-                            relative += (change / new.0[k].abs().max(dark[k])).powi(4);
+                            relative += (change / new.0[k].abs().max(*dark)).powi(4);
                         }
                         sum.squares += f64::from(*area) * f64::from(own[0]);
                         sum.whole += f64::from(*area) * f64::from(own[1]);
