@@ -72,8 +72,15 @@ const STEEP: f32 = 0.15;
 /// And by so many standard errors of the difference, or every pixel would gather where there is nothing but noise. Others were not tried.
 const CLEAR: f32 = 3.0;
 
+/// And part of those around that are steep, too: fewer are dots on a smooth wall, and what is an edge has two fifths.
+const BACKED: f32 = 0.25;
+
 /// Squares around a block, to each side, in which others of its surface are looked for.
 const AROUND: u32 = 2;
+
+/// So many times as far around steep blocks as others are looked for, others share what they found with the pixels that gather there: where these end, planes through their light
+/// alone lie below it where it is bent, and left a dark line.
+const RIM: usize = 4;
 
 /// How often the noise of blocks is evened out with that of those around.
 const FARTHER: usize = 4;
@@ -184,7 +191,7 @@ pub(crate) fn indirect(
         None => Timed::unlimited(monitor),
     };
     let timed = |blocks: &Blocks, is_least: bool| {
-        let (seconds, gathered) = pace::timed(|| blocks.gathered(baked, stations, is_least, &own));
+        let (seconds, gathered) = pace::timed(|| blocks.gathered(baked, stations, &[], is_least, &own));
         gathered.map(|gathered| (seconds, gathered))
     };
     let (mut seconds, mut gathered) = timed(&blocks, false)?;
@@ -197,13 +204,14 @@ pub(crate) fn indirect(
         let is_least = solution.options.looked_up && wider == WIDER[WIDER.len() - 1];
         (seconds, gathered) = timed(&blocks, is_least)?;
     }
-    let closer = gathered.as_ref().and_then(|gathered| blocks.closer(solution, gathered));
+    let closer = gathered.as_ref().and_then(|gathered| blocks.closer(solution, stations, gathered));
     // A deadline has to leave as much time again: the rest of the picture needs it more.
     let has_time = pace::left(&own).is_none_or(|left| pace::suffices(left, seconds));
     let closely = match &closer {
-        Some(closer) if has_time => closer.gathered(baked, stations, false, &own)?,
+        Some((closer, rim)) if has_time => closer.gathered(baked, stations, rim, false, &own)?,
         _ => None,
     };
+    let closer = closer.map(|(closer, _)| closer);
     is_whole &= closer.is_none() || closely.as_ref().is_some_and(|gathered| gathered.is_whole);
     // Elements that are only looked up make no field that is worth a look.
     let is_shown = |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.gathers[place]);
@@ -220,31 +228,34 @@ pub(crate) fn indirect(
             *light = field.at(s.place.triangle as usize, s.uv, s.side);
         });
     }
-    let shown = |blocks: &Blocks, gathered: Gathered, field: &[Bands]| {
-        let mut found = gathered.light;
-        if !solution.options.looked_up {
-            blocks.unless_sure(&mut found, field, &gathered.halves);
-        }
-        found
-    };
     let chosen = |blocks: &Blocks, light: &[Bands]| -> Vec<Bands> {
         blocks.blocks.iter().map(|block| light[block.chosen as usize]).collect()
     };
-    let closely = closer.zip(closely).map(|(closer, gathered)| {
-        let found = shown(&closer, gathered, &chosen(&closer, &light));
-        (closer, found)
-    });
-    if let Some(gathered) = gathered {
+    if let Some(Gathered { light: mut found, halves, .. }) = gathered {
         let field = chosen(&blocks, &light);
-        let found = shown(&blocks, gathered, &field);
+        if !solution.options.looked_up {
+            blocks.unless_sure(&mut found, &field, &halves);
+        }
         blocks.add(&found, &field, &mut light);
     }
-    if let Some((closer, found)) = closely {
+    if let Some((closer, Gathered { light: mut found, noise, .. })) = closer.zip(closely) {
+        closer.unless_clear(&mut found, &chosen(&closer, &light), &noise);
         for (block, found) in closer.blocks.iter().zip(found) {
             block.places.iter().for_each(|place| light[*place as usize] = found);
         }
     }
     Ok((light, is_whole))
+}
+
+/// How much of a difference is believed, by its square and that of its noise (a Wiener filter, as in `radiosity_view::pool`).
+fn sure((off, noise): (f32, f32)) -> f32 {
+    if off > 0.0 { (1.0 - SURE * noise / off).max(0.0) } else { 0.0 }
+}
+
+/// What two halves of the rays of a place found.
+fn finding(Station { place, side, .. }: &Station, halves: [Bands; 2]) -> Finding {
+    let (point, triangle) = (place.point, place.triangle as usize);
+    Finding { point, triangle, side: *side, light: mean(halves), noise: halved(halves), weight: 1.0 }
 }
 
 /// Whether the triangle of a station receives with its own normal all over.
@@ -297,8 +308,13 @@ impl<'a> Blocks<'a> {
         Blocks { view, side, blocks, beside, gathers }
     }
 
-    /// Blocks of a pixel where what these gathered is steep, no more than there are of these, where it is steepest; nothing where it is nowhere.
-    fn closer(&self, solution: &Solution, gathered: &Gathered) -> Option<Blocks<'a>> {
+    /// Blocks of a pixel where what these gathered is steep, no more than there are of these, where it is steepest, and what others around them found; nothing where it is nowhere.
+    fn closer(
+        &self,
+        solution: &Solution,
+        stations: &[Station],
+        gathered: &Gathered,
+    ) -> Option<(Blocks<'a>, Vec<Finding>)> {
         if self.side == 1 {
             return None;
         }
@@ -314,17 +330,36 @@ impl<'a> Blocks<'a> {
             self.beside[own].iter().map(|other| to(*other as usize)).fold(0.0, f32::max)
         };
         let steepness: Vec<f32> = (0..self.blocks.len()).into_par_iter().map(steepness).collect();
-        let mut steep: Vec<usize> = (0..self.blocks.len()).filter(|own| steepness[*own] > STEEP).collect();
+        let is_steep = |own: usize| steepness[own] > STEEP;
+        // One alone is the noise of one, and would be a dot.
+        let is_backed = |own: &usize| {
+            let beside = &self.beside[*own];
+            let backing = beside.iter().filter(|other| is_steep(**other as usize)).count();
+            backing as f32 >= BACKED * beside.len() as f32
+        };
+        let mut steep: Vec<usize> = (0..self.blocks.len()).filter(|own| is_steep(*own) && is_backed(own)).collect();
         steep.sort_by(|a, b| steepness[*b].total_cmp(&steepness[*a]).then(a.cmp(b)));
         let mut gathers = vec![false; self.gathers.len()];
         let mut left = self.blocks.len();
+        let mut is_near = vec![false; self.blocks.len()];
         for own in &steep {
             let places = &self.blocks[*own].places;
             let Some(rest) = left.checked_sub(places.len()) else { break };
             left = rest;
+            is_near[*own] = true;
             places.iter().for_each(|place| gathers[*place as usize] = true);
         }
-        (!steep.is_empty()).then(|| Blocks::of(self.view, gathers, 1, self.blocks.len()))
+        if steep.is_empty() {
+            return None;
+        }
+        for _ in 0..RIM {
+            let reaches = |own: usize| is_near[own] || self.beside[own].iter().any(|other| is_near[*other as usize]);
+            is_near = (0..is_near.len()).into_par_iter().map(reaches).collect();
+        }
+        let is_rim = |own: &usize| is_near[*own] && !gathers[self.blocks[*own].chosen as usize];
+        let found = |own: usize| finding(&stations[self.blocks[own].chosen as usize], gathered.halves[own]);
+        let rim = (0..is_near.len()).filter(is_rim).map(found).collect();
+        Some((Blocks::of(self.view, gathers, 1, self.blocks.len()), rim))
     }
 
     /// Means over each block and those beside it.
@@ -341,26 +376,40 @@ impl<'a> Blocks<'a> {
     fn unless_sure(&self, found: &mut [Bands], field: &[Bands], halves: &[[Bands; 2]]) {
         let off = |(halves, field): (&[Bands; 2], &Bands)| luminance(mean(*halves)) - luminance(*field);
         let off = self.around(&halves.iter().zip(field).map(off).collect::<Vec<f32>>());
-        // From farther around, as there need not be a bright path in a window where there might be.
-        let mut noise: Vec<f32> = halves.iter().map(|halves| halved(*halves).powi(2)).collect();
-        for _ in 0..FARTHER {
-            noise = self.around(&noise);
-        }
-        let sure = |number: usize| {
-            let noise = noise[number] / (self.beside[number].len() + 1) as f32;
-            if off[number] == 0.0 { 0.0 } else { (1.0 - SURE * noise / off[number].powi(2)).max(0.0) }
-        };
-        let sure = self.around(&(0..found.len()).map(sure).collect::<Vec<f32>>());
-        for ((found, field), sure) in found.iter_mut().zip(field).zip(sure) {
-            *found = std::array::from_fn(|k| field[k] + sure * (found[k] - field[k]));
+        let noise: Vec<f32> = halves.iter().map(|halves| halved(*halves).powi(2)).collect();
+        let noise =
+            self.farther(noise).into_iter().zip(&self.beside).map(|(noise, beside)| noise / (beside.len() + 1) as f32);
+        let off = off.into_iter().map(|off| off * off);
+        self.mix(found, field, off.zip(noise).map(sure).collect());
+    }
+
+    /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than twice their `noise`: they would
+    /// stand out as dots from what is beside them.
+    fn unless_clear(&self, found: &mut [Bands], between: &[Bands], noise: &[f32]) {
+        let off = |(found, between): (&Bands, &Bands)| (luminance(*found) - luminance(*between)).powi(2);
+        let off = self.around(&found.iter().zip(between).map(off).collect::<Vec<f32>>());
+        let noise = self.farther(noise.iter().map(|noise| noise * noise).collect());
+        self.mix(found, between, off.into_iter().zip(noise).map(sure).collect());
+    }
+
+    /// Means from farther around, as there need not be a bright path in a window where there might be.
+    fn farther(&self, noise: Vec<f32>) -> Vec<f32> {
+        (0..FARTHER).fold(noise, |noise, _| self.around(&noise))
+    }
+
+    /// Leaves of what was `found` so much as is sure, and `others` for the rest.
+    fn mix(&self, found: &mut [Bands], others: &[Bands], sure: Vec<f32>) {
+        for ((found, other), sure) in found.iter_mut().zip(others).zip(self.around(&sure)) {
+            *found = std::array::from_fn(|k| other[k] + sure * (found[k] - other[k]));
         }
     }
 
-    /// Light that the chosen places gather; nothing where time does not do for the fewest rays, unless this `is_least` that is done.
+    /// Light that the chosen places gather, and share with each other and with what a `rim` around them found; nothing where time does not do for the fewest rays, unless this `is_least` that is done.
     fn gathered(
         &self,
         baked: &Baked,
         stations: &[Station],
+        rim: &[Finding],
         is_least: bool,
         monitor: &dyn Monitor,
     ) -> Result<Option<Gathered>, Error> {
@@ -380,16 +429,11 @@ impl<'a> Blocks<'a> {
         }
 
         let planes = Planes::new(solution.tracer().mesh, &solution.elements);
-        let share = |found: &Found, halves: &[[Bands; 2]]| -> Vec<Pooled> {
-            let finding = |(i, Station { place, side, .. }): (usize, &Station)| Finding {
-                point: place.point,
-                triangle: place.triangle as usize,
-                side: *side,
-                light: found.light[i],
-                noise: halved(halves[i]),
-                weight: 1.0,
-            };
-            planes.pooled(&at.iter().enumerate().map(finding).collect::<Vec<_>>())
+        let share = |halves: &[[Bands; 2]]| -> Vec<Pooled> {
+            let own = at.iter().zip(halves).map(|(station, halves)| finding(station, *halves));
+            let mut pooled = planes.pooled(&own.chain(rim.iter().copied()).collect::<Vec<_>>());
+            pooled.truncate(at.len());
+            pooled
         };
         let (seconds, halves) = pace::timed(|| solution.halves_at(&places, first, 0, monitor));
         let each = seconds / first as f64;
@@ -397,7 +441,7 @@ impl<'a> Blocks<'a> {
         let mut found = Found::of_halves(&first_halves, first as u32, evened);
         // Those of places around together tell the noise, bright paths and all; what is evened out by light takes part of these for detail.
         let mut halves: Vec<[Bands; 2]> = first_halves.iter().map(|half| half.light).collect();
-        let mut pooled = share(&found, &halves);
+        let mut pooled = share(&halves);
         let wanted = self.wanted(baked, &places, &pooled);
         let none = vec![f64::INFINITY; at.len()];
         let mut is_whole = first == FIRST;
@@ -442,7 +486,7 @@ impl<'a> Blocks<'a> {
             if !any {
                 break;
             }
-            pooled = share(&found, &halves);
+            pooled = share(&halves);
         }
         // What paths find beyond what they look up may be less than nothing.
         let light = pooled.iter().map(|p| p.light.map(|e| e.max(0.0))).collect();
@@ -597,17 +641,31 @@ mod tests {
             let light: Vec<Bands> = (0..).zip(&blocks.blocks).map(|(i, block)| [level(i, block.square); 3]).collect();
             let noise = vec![noise; light.len()];
             let halves = light.iter().map(|e| [*e; 2]).collect();
-            blocks.closer(&solution, &Gathered { light, halves, noise, is_whole: true })
+            blocks.closer(&solution, &stations(&view), &Gathered { light, halves, noise, is_whole: true })
         };
         // Far more than the direct light there.
         let step = |by: f32| move |_, [x, _]: [u32; 2]| if x < 16 { 1e6 } else { 1e6 * (1.0 + by) };
-        let steep = closer(&step(0.2), 0.0).unwrap().blocks;
+        let steep = closer(&step(0.2), 0.0).unwrap().0.blocks;
         let reach = 16 - AROUND..16 + AROUND;
         assert!((460..540).contains(&steep.len()), "{} of 8 columns", steep.len());
         assert!(steep.iter().all(|block| reach.contains(&(block.square[0] / 2))));
         assert!(closer(&step(0.1), 0.0).is_none() && closer(&step(0.2), 1e5).is_none());
+        // Two that differ by a sixth, and from all others by half of that, are dots.
+        let number = |square: [u32; 2]| blocks.blocks.iter().position(|block| block.square == square).unwrap() as u32;
+        let two = [[15, 15], [16, 15]].map(number);
+        let pair = |i: u32, _| 1e6 * if i == two[0] { 1.09 } else { 1.0 - if i == two[1] { 0.09 } else { 0.0 } };
+        assert!(closer(&pair, 0.0).is_none());
 
-        let steep = closer(&|i, _| 1e6 * (1.0 + unit(hash(i))), 0.0).unwrap().blocks;
+        // What others found lies around, not far away.
+        let (own, rim) = closer(&step(0.2), 0.0).unwrap();
+        let is_rim = |finding: &Finding| {
+            let seen = view.seen.iter().position(|seen| seen.place.point == finding.point).unwrap();
+            let x = pixel(&view, seen as u32)[0] / 2;
+            !own.gathers[seen] && (16 - 5 * AROUND..16 + 5 * AROUND).contains(&x)
+        };
+        assert!(rim.len() > 100 && rim.iter().all(is_rim), "{}", rim.len());
+
+        let steep = closer(&|i, _| 1e6 * (1.0 + unit(hash(i))), 0.0).unwrap().0.blocks;
         let row = steep.iter().map(|block| f64::from(block.square[1])).sum::<f64>() / steep.len() as f64;
         assert!(steep.len() <= blocks.blocks.len() && 10 * steep.len() > 9 * blocks.blocks.len());
         assert!((24.0..40.0).contains(&row), "{row}");
@@ -631,8 +689,8 @@ mod tests {
 
         let blocks = Blocks::new(&baked.solution, &view, &stations, 1);
         assert_eq!(blocks.side, 2);
-        let gathered = blocks.gathered(&baked, &stations, false, &()).unwrap().unwrap();
-        let closer = blocks.closer(&baked.solution, &gathered).unwrap();
+        let gathered = blocks.gathered(&baked, &stations, &[], false, &()).unwrap().unwrap();
+        let (closer, _) = blocks.closer(&baked.solution, &stations, &gathered).unwrap();
         // What lies between blocks, over the field that the picture has: without pixels that gather all of it would be that.
         let solution = &baked.solution;
         assert!(!solution.options.looked_up);
@@ -652,16 +710,16 @@ mod tests {
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();
         let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
         let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
-        let [mut off, mut all] = [0f32; 2];
-        for (i, truth) in some.iter().zip(&truth) {
-            let truth = luminance(mean(truth.light));
-            off += (luminance(light[*i]) - truth).powi(2);
-            all += truth.powi(2);
-        }
-        let is_own = |i: &&usize| (luminance(light[**i]) / luminance(between[**i]) - 1.0).abs() > 0.005;
-        let own = some.iter().filter(is_own).count();
-        assert!(some.len() > 500 && 10 * own > 7 * some.len(), "{own} of {}", some.len());
-        assert!((off / all).sqrt() < 0.05, "{}", (off / all).sqrt());
+        let off = |light: &[Bands]| {
+            let squares = some.iter().zip(&truth).map(|(i, truth)| {
+                let truth = luminance(mean(truth.light));
+                [(luminance(light[*i]) - truth).powi(2), truth.powi(2)]
+            });
+            let [off, all] = squares.fold([0.0; 2], |sum, square| [sum[0] + square[0], sum[1] + square[1]]);
+            (off / all).sqrt()
+        };
+        let [own, interpolated] = [off(&light), off(&between)];
+        assert!(some.len() > 500 && own < 0.03 && own < 0.6 * interpolated, "{own} instead of {interpolated}");
     }
 
     /// Places in rows of [`SIDE`], each beside those of the 24 around that there are.
@@ -673,6 +731,25 @@ mod tests {
             *other != own && apart(own % SIDE, other % SIDE) && apart(own / SIDE, other / SIDE)
         };
         (0..SIDE * SIDE).filter(near).map(|other| other as u32).collect()
+    }
+
+    /// Where pixels find but noise around what lies between blocks, that stays; what is finer than that, and more than noise, is theirs.
+    #[test]
+    fn pixels_show_what_is_clearly_theirs() {
+        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
+        let beside: Vec<_> = (0..SIDE * SIDE).map(beside).collect();
+        let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
+        let draw = |i: usize| 0.2 * (unit(hash(i as u32)) - 0.5);
+        // Of this standard error.
+        let noise = vec![0.2 / 12f32.sqrt(); SIDE * SIDE];
+        let off = |detail: f32| {
+            let truth = |i: usize| 1.0 + if i.is_multiple_of(2) { detail } else { -detail };
+            let mut found: Vec<Bands> = (0..SIDE * SIDE).map(|i| [truth(i) + draw(i); 3]).collect();
+            blocks.unless_clear(&mut found, &vec![[1.0; 3]; SIDE * SIDE], &noise);
+            let squares = found.iter().enumerate().map(|(i, e)| (e[0] - truth(i)).powi(2));
+            (squares.sum::<f32>() / found.len() as f32).sqrt() / noise[0]
+        };
+        assert!(off(0.0) < 0.1 && off(0.5) < 1.2, "{} {}", off(0.0), off(0.5));
     }
 
     /// Bright paths that one half in two hundred meets do not show where the field is right; where it is wrong what was gathered stays.
