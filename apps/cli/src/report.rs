@@ -150,9 +150,9 @@ impl ErrorReport {
         })
     }
 
-    /// Whether the solution is good enough and too little of it reached the texels or vertices.
+    /// Whether the solution is good enough and too little of it reached the texels, vertices or pixels; nobody knows where the audit's own paths leave that open.
     pub fn is_lost_in_writing(&self) -> bool {
-        !self.achieved && self.solution_upper_95_one_sided <= self.asked
+        !self.achieved && !self.left_open && self.solution_upper_95_one_sided <= self.asked
     }
 
     /// Says what was reached, and how far that goes.
@@ -166,7 +166,7 @@ impl ErrorReport {
         let dim = self.dim.as_ref().filter(|dim| dim.share >= MUCH)?;
         let found = match dim.upper {
             upper if upper.is_finite() => {
-                format!("there the audit says {}, at most {}", percent(dim.error), percent(upper))
+                format!("there the audit {}, at most {}", said(dim.error, upper), percent(upper))
             }
             _ => "there the audit's paths tell nothing: measure points there".to_owned(),
         };
@@ -205,12 +205,7 @@ impl ErrorReport {
                 "error asked {asked}: NOT reached; the audit finds no light at all, but the answer has some"
             );
         }
-        let says = match self.estimated {
-            estimated if percent(estimated) == percent(0.0) && self.upper_95_one_sided > 0.0 => {
-                "cannot tell the answer from the truth".to_owned()
-            }
-            estimated => format!("says {}", percent(estimated)),
-        };
+        let says = said(self.estimated, self.upper_95_one_sided);
         let mut line = format!("error asked {}: {verdict}; audit {says}, {bound}", percent(self.asked));
         if self.is_lost_in_writing() {
             let within = percent(self.solution_upper_95_one_sided);
@@ -225,6 +220,14 @@ impl ErrorReport {
 
 /// Part of all places that dim ones are at least where that is said beside the verdict.
 const MUCH: f64 = 0.2;
+
+/// What an audit says of an error by its estimate and bound.
+fn said(estimated: f64, upper: f64) -> String {
+    match percent(estimated) {
+        none if none == percent(0.0) && upper > 0.0 => "cannot tell the answer from the truth".to_owned(),
+        some => format!("says {some}"),
+    }
+}
 
 fn percent(x: f64) -> String {
     format!("{:.3} %", 100.0 * x)
@@ -516,6 +519,15 @@ mod tests {
         assert!(by_rounds.contains("NOT reached (allow more --rounds"), "{by_rounds}");
         assert!(in_vain.contains("NOT reached (the last rounds came no nearer: "), "{in_vain}");
         assert!(open.contains("NOT reached for certain (light comes by few bright paths"), "{open}");
+        // Whether it is lost between solution and picture, finer ones being advised, is open, too.
+        let written = |left_open: bool| {
+            let of_solution = ErrorReport { solution_upper_95_one_sided: 0.005, ..report(0.015) };
+            let finer = "try more".to_owned();
+            ErrorReport { asked: 0.01, achieved: false, left_open, finer, ..of_solution }.line()
+        };
+        let [lost, open] = [false, true].map(written);
+        assert!(lost.ends_with("the solution itself is within 0.500 %: try more"), "{lost}");
+        assert!(open.contains("NOT reached for certain") && !open.contains("try more"), "{open}");
     }
 
     #[test]
