@@ -50,7 +50,7 @@ pub const ABOUT: &[(&str, &str)] = &[
     ("error.bias", BIAS),
     (
         "error.dim",
-        "places with less than a tenth of the root mean square illuminance, which hardly count in the error: below (lx), their share of all places, and the error there, relative to what is there; null where they are few, or where paths tell nothing",
+        "places answered to have less than a tenth of the root mean square illuminance, which hardly count in the error: below (lx), their share of all places, and the error there, relative to what is there, infinite (null) where paths tell nothing; all of it null where they are less than a twentieth of all",
     ),
     ("error.solution_estimated", SOLUTION),
     ("illuminance.low", "lx; 95 % of the area that any light reaches gets more"),

@@ -62,10 +62,13 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let mut error = ErrorReport::new((&audit, &baked.audit), &baked.rounds, &arguments.solve, is_over);
     if error.is_lost_in_writing() && error.upper_95_one_sided.is_finite() {
         let closer = error.asked * error.asked / error.upper_95_one_sided;
-        error.finer = match (is_over, closer < numbers::LEAST_ERROR) {
-            (true, _) => "allow more --time for the picture".to_owned(),
-            (false, true) => "the camera looks at harder places than there are on the whole".to_owned(),
-            (false, false) => format!(
+        error.finer = match closer < numbers::LEAST_ERROR {
+            _ if is_over => "allow more --time for the picture".to_owned(),
+            _ if error.left_open => {
+                "light comes by few bright paths, and those of the audit leave it open for the picture".to_owned()
+            }
+            true => "the camera looks at harder places than there are on the whole".to_owned(),
+            false => format!(
                 "the camera looks at harder places than there are on the whole; --error {}% comes nearer",
                 numbers::rough(100.0 * closer)
             ),

@@ -72,7 +72,7 @@ pub struct Audit {
     pub dim: Option<Dim>,
 }
 
-/// What an audit says of places with less than a [`DIM`]th of the root mean square light, as answered.
+/// What an audit says of places that were answered to have less than a tenth of the root mean square light. What is dim and was answered bright is not among them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Dim {
     /// Illuminance below which they are, lux.
@@ -85,10 +85,11 @@ pub struct Dim {
     pub upper: f64,
 }
 
-/// How many times less light than the root mean square makes places dim.
-pub const DIM: f64 = 10.0;
+/// How many times less light than the root mean square makes places dim: together they are a hundredth of the squared norm at most. With a hundred times, rooms behind windows
+/// count as bright.
+const DIM: f64 = 10.0;
 
-/// Part of all places that dim ones are at least where they are told of.
+/// Part of all places that dim ones are at least where they are told of: fifty of a thousand, of which two estimates each say something.
 const FEWEST_DIM: f64 = 0.05;
 
 impl Audit {
@@ -304,7 +305,12 @@ fn judge_dim(
 ) -> Option<Dim> {
     let answered = from.map_or(m, |(h, _)| h);
     let light: Vec<f64> = answered.iter().map(|h| f64::from(luminance(*h))).collect();
-    let below = (light.iter().map(|h| h * h).sum::<f64>() / light.len() as f64).sqrt() / DIM;
+    let mean_of = |squares: &mut dyn Iterator<Item = f64>, count: usize| squares.sum::<f64>() / count.max(1) as f64;
+    let square = match from {
+        Some((_, squares)) if !squares.is_empty() => mean_of(&mut squares.iter().map(|s| s[1]), squares.len()),
+        _ => mean_of(&mut light.iter().map(|h| h * h), light.len()),
+    };
+    let below = square.sqrt() / DIM;
     let dim: Vec<usize> = (0..light.len()).filter(|i| light[*i] < below).collect();
     let share = dim.len() as f64 / light.len() as f64;
     let own: Vec<f64> = dim.iter().flat_map(|i| &estimates[looks * i..looks * (i + 1)]).copied().collect();
@@ -312,19 +318,26 @@ fn judge_dim(
     if share < FEWEST_DIM || own.len() < 2 * FEWEST_PAIRS || is_black {
         return None;
     }
+    let untold = Dim { below, share, error: f64::INFINITY, upper: f64::INFINITY };
+    let Some(least) = least_norm(&own, looks) else { return Some(untold) };
     let at = |of: &[Bands]| dim.iter().map(|i| of[*i]).collect::<Vec<Bands>>();
     let (m, h) = (at(m), at(answered));
-    let squares = from.map(|(_, squares)| squares.iter().filter(|s| s[1] < below * below).copied().collect::<Vec<_>>());
-    let Audit { error, upper, .. } =
-        judge((&own, looks), &m, squares.as_ref().map(|squares| (&h[..], &squares[..])), paths);
-    // Estimates of what there is may come to next to nothing, or less, by their noise.
-    let is_told = upper <= 1.0;
-    Some(Dim {
-        below,
-        share,
-        error: if is_told { error } else { f64::INFINITY },
-        upper: if is_told { upper } else { f64::INFINITY },
-    })
+    let squares: Vec<[f64; 2]> =
+        from.map_or(Vec::new(), |(_, all)| all.iter().filter(|s| s[1] < below * below).copied().collect());
+    // A handful says nothing, as of all places.
+    let from = (squares.len() >= FEWEST_PAIRS).then_some((&h[..], &squares[..]));
+    let Audit { error, upper, .. } = judge((&own, looks), &m, from, paths);
+    Some(Dim { error, upper: upper / least, ..untold })
+}
+
+/// How little light there may be beside what estimates say of all the places together, that is, by what an error relative to it is divided at least; none where they do not tell.
+fn least_norm(estimates: &[f64], looks: usize) -> Option<f64> {
+    let squares: Vec<f64> = estimates.chunks_exact(looks).map(|own| mean_product(own.iter().copied())).collect();
+    let n = squares.len() as f64;
+    let mean = squares.iter().sum::<f64>() / n;
+    let variance = squares.iter().map(|square| (square - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0);
+    let deviation = variance.sqrt();
+    (mean > CERTAIN * deviation).then(|| (1.0 - ONE_SIDED_95 * deviation / mean).sqrt())
 }
 
 /// Judges by so many estimates of each place: two, by what they scatter over places, or more, by what they scatter at each.
@@ -414,6 +427,8 @@ mod tests {
         assert!((told.error - 0.1).abs() < 1e-6 && (told.share - 0.4).abs() < 1e-9 && told.upper >= told.error);
         assert!((told.below - 100.0 * 0.6f64.sqrt()).abs() < 0.01, "{told:?}");
         assert_eq!(dim(0.4, [1.1, 1000.0], [0.0, 9.0]).dim.map(|dim| dim.upper), Some(f64::INFINITY));
+        // However wrong it is, if paths are sure.
+        assert!((dim(0.4, [3.0, 1000.0], [1.0; 2]).dim.unwrap().error - 2.0).abs() < 1e-6);
         for audit in
             [dim(0.02, [1.1, 1000.0], [1.0; 2]), dim(0.4, [0.0, 1000.0], [0.0; 2]), dim(0.4, [200.0, 1e3], [200.; 2])]
         {
@@ -425,6 +440,28 @@ mod tests {
         let squares: Vec<[f64; 2]> = (0..500).map(|k| if k < 200 { [0.04, 1.0] } else { [0.0, 1e6] }).collect();
         let told = judge_with_dim((&estimates, 2), &h, Some((&h, &squares)), 1).dim.unwrap();
         assert!((told.error - 0.2).abs() < 1e-6, "{told:?}");
+        assert!((told.below - 0.1 * 6e5f64.sqrt()).abs() < 0.1, "by further places: {told:?}");
+        // None of them dim: what is known of these places alone is told.
+        let told = judge_with_dim((&estimates, 2), &h, Some((&h, &[[0.0, 1e6]; 500])), 1).dim.unwrap();
+        assert!((told.share - 0.4).abs() < 1e-9 && told.error < 1e-6, "{told:?}");
+    }
+
+    /// Where one path in twenty finds light, what is told of dim places holds all the same, however wrong the answer is: in 95 % of cases less three standard errors of what is counted.
+    #[test]
+    fn bounds_of_dim_places_hold() {
+        let mut random = Random::new(3);
+        for off in [0.0, 0.1, 0.3, 1.0] {
+            let (mut told, mut held) = (0, 0);
+            for _ in 0..400 {
+                let mut mean = || (0..100).filter(|_| random.next_unit() < 0.05).count() as f64 / 5.0;
+                let estimates: Vec<f64> = (0..600).map(|k| if k < 300 { mean() } else { 1000.0 }).collect();
+                let m: Vec<Bands> = (0..300).map(|k| [if k < 150 { 1.0 + off as f32 } else { 1000.0 }; 3]).collect();
+                let dim = judge_with_dim((&estimates, 2), &m, None, 1).dim.unwrap();
+                told += usize::from(dim.upper.is_finite());
+                held += usize::from(dim.upper >= off);
+            }
+            assert!(told > 380 && held >= 367, "{off}: {held} of {told} told");
+        }
     }
 
     /// A few bright paths of the referee are no proof that an answer is wrong; that all places say so is.

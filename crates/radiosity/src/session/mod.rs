@@ -438,10 +438,20 @@ fn element_size(scene: &Scene, options: &SessionOptions) -> f64 {
         if least <= wanted && Live::count(scene, size) <= wanted {
             break;
         }
-        size *= 1.19;
+        size *= STEP;
+    }
+    // A triangle has only so many elements: those that a wide ground cannot have are for what stands on it.
+    if 2 * Live::count(scene, size) < wanted {
+        let steps: Vec<i32> = (1..MOST_NARROWER).collect();
+        let fitting = steps.partition_point(|steps| Live::count(scene, size / STEP.powi(*steps)) <= wanted);
+        size /= STEP.powi(fitting as i32);
     }
     size
 }
+
+/// By what widths of elements are tried, and how often that is: a millionth of them at least.
+const STEP: f64 = 1.19;
+const MOST_NARROWER: i32 = 80;
 
 /// The objects of a scene as the file has them.
 fn placed(live: &Live) -> Vec<Placed> {

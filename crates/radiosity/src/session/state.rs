@@ -31,7 +31,7 @@ const QUICK_SWEEPS: u32 = 4;
 /// Each sweep takes half as many rays as the one before it: it moves about half as much light.
 const LEAST_QUICK_RAYS: usize = 4;
 
-/// Residual of pictures while rays are still traced, whose noise is far above it.
+/// Residual of pictures while rays are still traced, whose noise is far above it. Dim places may lack some times as much of theirs.
 const ROUGH_TOLERANCE: f64 = 1e-3;
 
 /// Residual of columns.

@@ -484,3 +484,19 @@ fn edits_are_json() {
     );
     assert_eq!(serde_json::from_str::<Edit>(&text).unwrap(), edit);
 }
+
+/// A triangle has a few thousand elements at most: of a house on 3 km of ground, all that the ground cannot have are in the house, which had one to a triangle.
+#[test]
+fn a_wide_ground_leaves_elements_to_what_stands_on_it() {
+    let mut scene = cornell_box();
+    let room = scene.triangles.len();
+    let count = |scene: &Scene| {
+        let options = SessionOptions { elements: 20_000, rays: 4, ..SessionOptions::default() };
+        Session::new(scene.clone(), &options).unwrap().status().elements
+    };
+    let corner = |x: f64, z: f64| glam::DVec3::new(1500.0 * x, -1.0, 1500.0 * z);
+    scene.add_quad("ground", 0, [corner(-1., -1.), corner(-1., 1.), corner(1., 1.), corner(1., -1.)]);
+    let both = count(&scene);
+    // Two triangles of 64 × 64.
+    assert!(both <= 20_000 && both > 8192 + 50 * room, "{both}");
+}
