@@ -69,6 +69,9 @@ const PICTURED: f64 = 0.4;
 /// Pages that a lightmap hardly gets to: of 4096 × 4096 texels each.
 const PAGES: usize = 1000;
 
+/// Part of a lightmap's values from which on it is said that 8 bits do not hold them.
+const MOST_COARSE: f64 = 0.05;
+
 /// Runs the verb.
 pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Result<(), Failure> {
     let target = output_path(arguments);
@@ -191,6 +194,14 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
             outputs.stage(&beside, &encode_exr(size[0], size[1], texels).map_err(Failure::work)?)?;
             pages.push(beside);
         }
+        let coarse = map.coarse(encoding);
+        if coarse > MOST_COARSE {
+            progress.say(&format!(
+                "note: in the model's 8 bits {:.0} % of the lightmap's values are off by more than a tenth; {} has all of the light",
+                100.0 * coarse,
+                page_path(&target, 0).display()
+            ));
+        }
         let style = Style::Lightmap { pages: map.images(encoding)?, encoding, exposure: 1.0 };
         (lit_glb(&input.scene, input.document.as_ref(), &map.primitives, &style), map.audit, map.rounds, map.hurried)
     };
@@ -282,7 +293,7 @@ fn tell(report: &Report, delta_e: Option<f64>, global: &Global, progress: &Progr
     }
     if let Some(map) = report.lightmap.as_ref().filter(|map| map.reduced_charts > 0) {
         progress.say(&format!(
-            "warning: {} not fit on a page at {} texels per metre; --max-atlas allows larger pages",
+            "warning: {} not fit on a page at {:.1} texels per metre; --max-atlas allows larger pages",
             counted(map.reduced_charts, "chart does", "charts do"),
             map.density
         ));

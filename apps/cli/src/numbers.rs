@@ -66,7 +66,7 @@ pub fn angle(text: &str) -> Result<f64, String> {
 }
 
 /// The least relative error that can be asked for: that of single precision is not far below.
-pub const LEAST_ERROR: f64 = 1e-4;
+const LEAST_ERROR: f64 = 1e-4;
 
 /// A relative error. A bare 1 is refused, as it may mean 1 % or all of it.
 pub fn error(text: &str) -> Result<f64, String> {

@@ -61,18 +61,12 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     let is_over = baked.out_of_time || view.is_hurried || progress.is_over();
     let mut error = ErrorReport::new((&audit, &baked.audit), &baked.rounds, &arguments.solve, is_over);
     if error.is_lost_in_writing() && error.upper_95_one_sided.is_finite() {
-        let closer = error.asked * error.asked / error.upper_95_one_sided;
-        error.finer = match closer < numbers::LEAST_ERROR {
-            _ if is_over => "allow more --time for the picture".to_owned(),
-            _ if error.left_open => {
-                "light comes by few bright paths, and those of the audit leave it open for the picture".to_owned()
-            }
-            true => "the camera looks at harder places than there are on the whole".to_owned(),
-            false => format!(
-                "the camera looks at harder places than there are on the whole; --error {}% comes nearer",
-                numbers::rough(100.0 * closer)
-            ),
-        };
+        error.finer = match () {
+            () if is_over => "allow more --time for the picture",
+            () if error.left_open => "light comes by few bright paths, and those of the audit leave it open for the picture",
+            () => "the camera looks at harder places than there are on the whole, where light changes from pixel to pixel; a smaller --error may help little",
+        }
+        .to_owned();
     }
     error.unlit(&input.scene, &baked.audit).iter().for_each(|warning| progress.say(warning));
     let shown = baked.solution.displayed(Some(exposure));
@@ -89,6 +83,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         progress.say(&views::nearness(&shown, asked));
     }
     let output = arguments.output.display();
-    progress.say(&format!("wrote {output} ({width} x {height}), {:.1} s", progress.seconds()));
+    let seconds = progress.seconds();
+    progress
+        .say(&format!("wrote {output} ({width} x {height}), exposure {}, {seconds:.1} s", numbers::fixed(exposure, 2)));
     Ok(())
 }

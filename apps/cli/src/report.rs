@@ -165,8 +165,11 @@ impl ErrorReport {
     pub fn dimly(&self) -> Option<String> {
         let dim = self.dim.as_ref().filter(|dim| dim.share >= MUCH)?;
         let found = match dim.upper {
+            upper if upper.is_finite() && dim.lower > 0.0 => {
+                format!("there the audit says {}, at most {}", percent(dim.error), percent(upper))
+            }
             upper if upper.is_finite() => {
-                format!("there the audit {}, at most {}", said(dim.error, upper), percent(upper))
+                format!("there the audit knows no more than that it is at most {}", percent(upper))
             }
             _ => "there the audit's paths tell nothing: only of points there, by themselves, may they tell more"
                 .to_owned(),
@@ -206,7 +209,12 @@ impl ErrorReport {
                 "error asked {asked}: NOT reached; the audit finds no light at all, but the answer has some"
             );
         }
-        let says = said(self.estimated, self.upper_95_one_sided);
+        let says = match self.estimated {
+            estimated if percent(estimated) == percent(0.0) && self.upper_95_one_sided > 0.0 => {
+                "cannot tell the answer from the truth".to_owned()
+            }
+            estimated => format!("says {}", percent(estimated)),
+        };
         let mut line = format!("error asked {}: {verdict}; audit {says}, {bound}", percent(self.asked));
         if self.is_lost_in_writing() {
             let within = percent(self.solution_upper_95_one_sided);
@@ -220,15 +228,7 @@ impl ErrorReport {
 }
 
 /// Part of all places that dim ones are at least where that is said beside the verdict: dark corners and what is beneath furniture are an eighth of a furnished office.
-const MUCH: f64 = 0.2;
-
-/// What an audit says of an error by its estimate and bound.
-fn said(estimated: f64, upper: f64) -> String {
-    match percent(estimated) {
-        none if none == percent(0.0) && upper > 0.0 => "cannot tell the answer from the truth".to_owned(),
-        some => format!("says {some}"),
-    }
-}
+const MUCH: f64 = 0.15;
 
 fn percent(x: f64) -> String {
     format!("{:.3} %", 100.0 * x)
@@ -338,6 +338,7 @@ impl Report {
                 let (texels, density) = (map.texels, map.density);
                 // One that is fine where light is rough is not beaten by a little more everywhere.
                 let advice = match map.finest > density {
+                    _ if map.reduced_charts > 0 => "--max-atlas allows larger pages".to_owned(),
                     true => "no more are made unasked, --texels-per-metre sets one density everywhere".to_owned(),
                     false => format!("--texels-per-metre {:.0} comes nearer", (2.0 * density).ceil()),
                 };
@@ -499,10 +500,12 @@ mod tests {
     /// Where much is dim, a verdict of the rest is not taken for one of it.
     #[test]
     fn dim_places_are_told_of_where_they_are_much() {
-        let dimly = |share: f64, upper: f64| {
-            let dim = Some(Dim { below: 484.1, share, error: 0.5 * upper, upper });
+        let dim = |share: f64, upper: f64, lower: f64| {
+            let dim = Some(Dim { below: 484.1, share, error: 0.5 * upper, upper, lower });
             ErrorReport { dim, ..report(0.01) }.dimly()
         };
+        let dimly = |share: f64, upper: f64| dim(share, upper, 0.05);
+        assert!(dim(0.44, 0.2, 0.0).unwrap().ends_with("no more than that it is at most 20.000 %"));
         let told = dimly(0.44, 0.2).unwrap();
         let begins = "44 % of places have less than 484 lx, a tenth of what this error is relative to";
         assert!(told.starts_with(begins) && told.ends_with("the audit says 10.000 %, at most 20.000 %"), "{told}");

@@ -3,7 +3,8 @@
 //! its elements are.
 //!
 //! One place in a block of a few pixels gathers for each surface that the block shows; those of a plane share what they found ([`Planes`]), and the
-//! noisy ones send more rays ([`crate::allocation`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers. Surfaces that are not flat have the continuous field of the elements:
+//! noisy ones send more rays ([`crate::allocation`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers, shares with what blocks around found, and shows
+//! what differs from what lies between these by more than noise. Surfaces that are not flat have the continuous field of the elements:
 //! places with normals of their own share with no other, and would be as grainy as each is noisy.
 //!
 //! Places do not share over walls, but blocks know none: beside a wall that is narrower than a block, light of one side may show on the other, for its pixels.
@@ -72,20 +73,23 @@ const STEEP: f32 = 0.15;
 /// And by so many standard errors of the difference, or every pixel would gather where there is nothing but noise. Others were not tried.
 const CLEAR: f32 = 3.0;
 
-/// And part of those around that are steep, too: fewer are dots on a smooth wall, and what is an edge has two fifths.
+/// From so many of those around it has to be unlike: beside a straight edge there are five, and beside a block that is noise alone there is one.
+const UNLIKE: usize = 3;
+
+/// And part of those around that are steep, too: two fifths beside a straight edge, a third at the corner of something bright, next to nothing where one or two are noise.
 const BACKED: f32 = 0.25;
 
 /// Squares around a block, to each side, in which others of its surface are looked for.
 const AROUND: u32 = 2;
 
-/// So many times as far around steep blocks as others are looked for, others share what they found with the pixels that gather there: where these end, planes through their light
-/// alone lie below it where it is bent, and left a dark line.
+/// Blocks up to so many times [`AROUND`] from steep ones share what they found with the pixels that gather there: where these end, planes through their light alone lie below it where it is bent, which left a dark
+/// line. With half and with twice as many nothing was tried.
 const RIM: usize = 4;
 
 /// How often the noise of blocks is evened out with that of those around.
 const FARTHER: usize = 4;
 
-/// Squared ratio of what the field misses to the noise of that from which on it is believed: twice. With three times rooms whose field is wrong all over are
+/// Squared ratio of what the field misses to the noise of that from which on it is believed, and of what pixels differ by from what lies between blocks: twice. With three times rooms whose field is wrong all over are
 /// a fifth farther off, with 1.7 a room with a bright gap had dark stains.
 const SURE: f32 = 4.0;
 
@@ -327,11 +331,13 @@ impl<'a> Blocks<'a> {
                 let is_clear = off > CLEAR * gathered.noise[own].hypot(gathered.noise[other]);
                 if is_clear { off / all.max(f32::MIN_POSITIVE) } else { 0.0 }
             };
-            self.beside[own].iter().map(|other| to(*other as usize)).fold(0.0, f32::max)
+            let mut to: SmallVec<[f32; 24]> = self.beside[own].iter().map(|other| to(*other as usize)).collect();
+            to.sort_unstable_by(|a, b| b.total_cmp(a));
+            to.get(UNLIKE - 1).copied().unwrap_or(0.0)
         };
         let steepness: Vec<f32> = (0..self.blocks.len()).into_par_iter().map(steepness).collect();
         let is_steep = |own: usize| steepness[own] > STEEP;
-        // One alone is the noise of one, and would be a dot.
+        // Those of which few around are steep as well are the noise of one or two, and would be dots.
         let is_backed = |own: &usize| {
             let beside = &self.beside[*own];
             let backing = beside.iter().filter(|other| is_steep(**other as usize)).count();
@@ -358,7 +364,8 @@ impl<'a> Blocks<'a> {
         }
         let is_rim = |own: &usize| is_near[*own] && !gathers[self.blocks[*own].chosen as usize];
         let found = |own: usize| finding(&stations[self.blocks[own].chosen as usize], gathered.halves[own]);
-        let rim = (0..is_near.len()).filter(is_rim).map(found).collect();
+        // All together no more than there were: memory was asked for as many.
+        let rim = (0..is_near.len()).filter(is_rim).take(left).map(found).collect();
         Some((Blocks::of(self.view, gathers, 1, self.blocks.len()), rim))
     }
 
@@ -384,7 +391,7 @@ impl<'a> Blocks<'a> {
     }
 
     /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than twice their `noise`: they would
-    /// stand out as dots from what is beside them.
+    /// stand out as dots from what is beside them. The noise of blocks is in both, as the pixels that were theirs send the same rays again.
     fn unless_clear(&self, found: &mut [Bands], between: &[Bands], noise: &[f32]) {
         let off = |(found, between): (&Bands, &Bands)| (luminance(*found) - luminance(*between)).powi(2);
         let off = self.around(&found.iter().zip(between).map(off).collect::<Vec<f32>>());
@@ -650,11 +657,13 @@ mod tests {
         assert!((460..540).contains(&steep.len()), "{} of 8 columns", steep.len());
         assert!(steep.iter().all(|block| reach.contains(&(block.square[0] / 2))));
         assert!(closer(&step(0.1), 0.0).is_none() && closer(&step(0.2), 1e5).is_none());
-        // Two that differ by a sixth, and from all others by half of that, are dots.
+        // One or two that are unlike all others are dots.
         let number = |square: [u32; 2]| blocks.blocks.iter().position(|block| block.square == square).unwrap() as u32;
         let two = [[15, 15], [16, 15]].map(number);
-        let pair = |i: u32, _| 1e6 * if i == two[0] { 1.09 } else { 1.0 - if i == two[1] { 0.09 } else { 0.0 } };
-        assert!(closer(&pair, 0.0).is_none());
+        let dots = |[a, b]: [f32; 2]| {
+            closer(&|i, _| 1e6 * if i == two[0] { a } else { if i == two[1] { b } else { 1.0 } }, 0.0).is_none()
+        };
+        assert!(dots([1.09, 0.91]) && dots([1.5, 1.0]) && dots([0.5, 1.0]) && dots([1.3, 0.7]));
 
         // What others found lies around, not far away.
         let (own, rim) = closer(&step(0.2), 0.0).unwrap();

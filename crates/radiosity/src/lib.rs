@@ -22,6 +22,7 @@ mod cornell;
 mod displayed;
 mod division;
 mod edges;
+mod eight_bits;
 mod element_light;
 mod equation;
 mod error;

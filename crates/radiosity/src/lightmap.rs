@@ -2,6 +2,7 @@
 
 use crate::bake::Baked;
 use crate::canvas::{Canvas, Drawn};
+use crate::eight_bits::{Classes, code};
 use crate::faces::lit_vertex;
 use crate::judge::{Judge, STEP, Written, WrittenRound, is_stalled, root_mean_square};
 use crate::monitor::is_over;
@@ -10,7 +11,6 @@ use crate::{Error, Monitor};
 use glam::DVec2;
 use radiosity_io::gltf_out::{Encoding, Light, LitPrimitive, PageImage};
 use radiosity_io::image_out::encode_png;
-use radiosity_scene::display::srgb;
 use radiosity_scene::{Bands, Mesh, Side};
 use radiosity_view::Audit;
 use radiosity_view::lightmap::{Allotment, Atlas, Detail, LightmapError, UnwrapParams};
@@ -45,22 +45,28 @@ pub struct Lightmap {
 }
 
 impl Lightmap {
-    /// The pages as pictures of 8 bits, each scaled by its brightest texel.
+    /// The pages as pictures of 8 bits, each scaled so that as little as possible is lost: light that is far above all other, on next to nothing of a page, is cut off there.
     ///
     /// # Errors
     /// [`Error::Picture`] if one cannot be encoded.
     pub fn images(&self, encoding: Encoding) -> Result<Vec<PageImage>, Error> {
         let image = |(size, lux): (&[u32; 2], &Vec<Bands>)| {
-            let peak = lux.iter().flatten().fold(0f32, |most, e| most.max(*e));
-            let intensity = if peak > 0.0 { peak } else { 1.0 };
-            let encode = |e: f32| {
-                let share = (e / intensity).clamp(0.0, 1.0);
-                (255.0 * if encoding == Encoding::Srgb { srgb(share) } else { share }).round() as u8
-            };
-            let pixels: Vec<[u8; 3]> = lux.iter().map(|e| e.map(encode)).collect();
+            let intensity = Classes::new(lux, encoding).brightest();
+            let pixels: Vec<[u8; 3]> = lux.iter().map(|e| e.map(|e| code(e / intensity, encoding))).collect();
             Ok(PageImage { png: encode_png(size[0], size[1], &pixels)?, intensity })
         };
         self.pages.iter().zip(&self.irradiance).map(image).collect()
+    }
+
+    /// Which part of the light of all texels is off by more than a tenth of itself in such pictures.
+    pub fn coarse(&self, encoding: Encoding) -> f64 {
+        let of_page = |lux: &Vec<Bands>| {
+            let classes = Classes::new(lux, encoding);
+            classes.coarse(classes.brightest())
+        };
+        let add = |[coarse, all]: [f64; 2], own: [f64; 2]| [coarse + own[0], all + own[1]];
+        let [coarse, all] = self.irradiance.iter().map(of_page).fold([0.0; 2], add);
+        if all > 0.0 { coarse / all } else { 0.0 }
     }
 }
 

@@ -81,8 +81,10 @@ pub struct Dim {
     pub share: f64,
     /// Estimated relative L2 error of irradiance there, relative to what is there; infinite where paths tell nothing.
     pub error: f64,
-    /// One-sided 95 % upper bound of that.
+    /// One-sided 95 % bound of that from above.
     pub upper: f64,
+    /// One-sided 95 % bound of that from below.
+    pub lower: f64,
 }
 
 /// How many times less light than the root mean square makes places dim: together they are a hundredth of the squared norm at most. With a hundred times, rooms behind windows
@@ -318,7 +320,7 @@ fn judge_dim(
     if share < FEWEST_DIM || own.len() < 2 * FEWEST_PAIRS || is_black {
         return None;
     }
-    let untold = Dim { below, share, error: f64::INFINITY, upper: f64::INFINITY };
+    let untold = Dim { below, share, error: f64::INFINITY, upper: f64::INFINITY, lower: 0.0 };
     let Some(least) = least_norm(&own, looks) else { return Some(untold) };
     let at = |of: &[Bands]| dim.iter().map(|i| of[*i]).collect::<Vec<Bands>>();
     let (m, h) = (at(m), at(answered));
@@ -326,8 +328,8 @@ fn judge_dim(
         from.map_or(Vec::new(), |(_, all)| all.iter().filter(|s| s[1] < below * below).copied().collect());
     // A handful says nothing, as of all places.
     let from = (squares.len() >= FEWEST_PAIRS).then_some((&h[..], &squares[..]));
-    let Audit { error, upper, .. } = judge((&own, looks), &m, from, paths);
-    Some(Dim { error, upper: upper / least, ..untold })
+    let Audit { error, upper, lower, .. } = judge((&own, looks), &m, from, paths);
+    Some(Dim { error, upper: upper / least, lower: lower * least, ..untold })
 }
 
 /// How little light there may be beside what estimates say of all the places together, that is, by what an error relative to it is divided at least; none where they do not tell.

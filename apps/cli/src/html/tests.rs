@@ -48,7 +48,7 @@ fn example(rounds: usize) -> Report {
             points: last.map_or(0, |_| 1000),
             paths_per_estimate: 256,
             mean_illuminance: 412.0,
-            dim: Some(Dim { below: 41.0, share: 0.3, error: 0.1, upper: 0.2 }),
+            dim: Some(Dim { below: 41.0, share: 0.3, error: 0.1, upper: 0.2, lower: 0.0 }),
             seed: 17,
             solution_estimated: 0.9 * estimated,
             solution_upper_95_one_sided: 0.9 * upper,

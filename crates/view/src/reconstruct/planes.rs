@@ -310,6 +310,37 @@ mod tests {
         }
     }
 
+    /// Where a band of places ends in which light begins to rise, planes through them alone lie below it; those of wider ones around hold them up.
+    #[test]
+    fn places_around_a_band_hold_up_its_ends() {
+        let (scene, mesh) = scene(false);
+        let planes = Planes::new(&mesh, &Elements::new(&scene, &mesh, 0.5));
+        let truth = |x: f64| 1.0 + (600.0 * (x - 0.52).max(0.0).powi(2)).min(2.0);
+        let finding = |(x, y): (f64, f64), i: usize| {
+            let triangle = (0..2).find(|t| mesh.barycentric(*t, DVec3::new(x, y, 0.0)).min_element() >= 0.0).unwrap();
+            let light = truth(x) + 0.2 * (f64::from(unit(hash(i as u32))) - 0.5);
+            let noise = 0.2 / 12f32.sqrt();
+            let point = DVec3::new(x, y, 0.0);
+            Finding { point, triangle, side: Side::Front, light: [light as f32; 3], noise, weight: 1.0 }
+        };
+        let grid = |x: [f64; 2], step: f64| {
+            let columns = ((x[1] - x[0]) / step).round() as usize;
+            let rows = (1.0 / step).round() as usize;
+            let at = move |i: usize| (x[0] + step * (i % columns) as f64, 0.5 + step * (i / columns) as f64);
+            (0..columns * rows).map(move |i| (at(i), i))
+        };
+        let band: Vec<Finding> = grid([0.5, 0.58], 0.01).map(|(at, i)| finding(at, i)).collect();
+        let around = grid([0.34, 0.5], 0.02).chain(grid([0.58, 0.74], 0.02)).map(|(at, i)| finding(at, i + 100_000));
+        let both: Vec<Finding> = band.iter().copied().chain(around).collect();
+        let off = |pooled: &[Pooled]| {
+            let first: Vec<usize> = (0..band.len()).filter(|i| band[*i].point.x < 0.515).collect();
+            let off = first.iter().map(|i| f64::from(pooled[*i].light[0]) - truth(band[*i].point.x));
+            off.sum::<f64>() / first.len() as f64
+        };
+        let [alone, held] = [&band, &both].map(|places| off(&planes.pooled(places)));
+        assert!(alone < -0.008 && held.abs() < 0.5 * alone.abs(), "{alone} alone, {held} held up");
+    }
+
     /// Noise of places of one plane is shared away, and nothing of their light comes to those of another.
     #[test]
     fn only_places_of_one_plane_share() {
