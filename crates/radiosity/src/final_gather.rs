@@ -73,10 +73,8 @@ const STEEP: f32 = 0.15;
 /// And by so many standard errors of the difference, or every pixel would gather where there is nothing but noise. Others were not tried.
 const CLEAR: f32 = 3.0;
 
-/// From so many of those around it has to be unlike: beside a straight edge there are five, and beside a block that is noise alone there is one.
-const UNLIKE: usize = 3;
-
-/// And part of those around that are steep, too: two fifths beside a straight edge, a third at the corner of something bright, next to nothing where one or two are noise.
+/// And part of those around that are steep, too: two fifths beside a straight edge, a third at the corner of something bright, next to nothing where a few are unlike each other alone, which is noise. Where one
+/// is unlike all others, these are steep as well; to ask that each is unlike three of them makes the bands beside shadows ragged.
 const BACKED: f32 = 0.25;
 
 /// Squares around a block, to each side, in which others of its surface are looked for.
@@ -331,13 +329,11 @@ impl<'a> Blocks<'a> {
                 let is_clear = off > CLEAR * gathered.noise[own].hypot(gathered.noise[other]);
                 if is_clear { off / all.max(f32::MIN_POSITIVE) } else { 0.0 }
             };
-            let mut to: SmallVec<[f32; 24]> = self.beside[own].iter().map(|other| to(*other as usize)).collect();
-            to.sort_unstable_by(|a, b| b.total_cmp(a));
-            to.get(UNLIKE - 1).copied().unwrap_or(0.0)
+            self.beside[own].iter().map(|other| to(*other as usize)).fold(0.0, f32::max)
         };
         let steepness: Vec<f32> = (0..self.blocks.len()).into_par_iter().map(steepness).collect();
         let is_steep = |own: usize| steepness[own] > STEEP;
-        // Those of which few around are steep as well are the noise of one or two, and would be dots.
+        // Those of which few around are steep as well are unlike each other by their noise, and would be dots.
         let is_backed = |own: &usize| {
             let beside = &self.beside[*own];
             let backing = beside.iter().filter(|other| is_steep(**other as usize)).count();
@@ -657,13 +653,14 @@ mod tests {
         assert!((460..540).contains(&steep.len()), "{} of 8 columns", steep.len());
         assert!(steep.iter().all(|block| reach.contains(&(block.square[0] / 2))));
         assert!(closer(&step(0.1), 0.0).is_none() && closer(&step(0.2), 1e5).is_none());
-        // One or two that are unlike all others are dots.
+        // Two that differ by a sixth, and from all others by half of that, would be dots.
         let number = |square: [u32; 2]| blocks.blocks.iter().position(|block| block.square == square).unwrap() as u32;
         let two = [[15, 15], [16, 15]].map(number);
-        let dots = |[a, b]: [f32; 2]| {
-            closer(&|i, _| 1e6 * if i == two[0] { a } else { if i == two[1] { b } else { 1.0 } }, 0.0).is_none()
+        let pair = |i: u32, _| {
+            let by = if i == two[0] { 0.09 } else { -0.09 };
+            1e6 * if two.contains(&i) { 1.0 + by } else { 1.0 }
         };
-        assert!(dots([1.09, 0.91]) && dots([1.5, 1.0]) && dots([0.5, 1.0]) && dots([1.3, 0.7]));
+        assert!(closer(&pair, 0.0).is_none());
 
         // What others found lies around, not far away.
         let (own, rim) = closer(&step(0.2), 0.0).unwrap();
