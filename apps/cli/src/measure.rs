@@ -129,7 +129,8 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
     if let Some(warning) = dark(&input.scene, &places, &measured.irradiance) {
         progress.say(&warning);
     }
-    let levels = Levels::of(measured.irradiance.iter().map(|e| luminance(*e)));
+    let lux = || measured.irradiance.iter().map(|e| luminance(*e));
+    let (levels, lit) = (Levels::of(lux()), Levels::of(lux().filter(|e| *e > 0.0)));
     let audit = &measured.audit;
     let error = ErrorReport::new((audit, audit), &measured.rounds, &arguments.solve, measured.out_of_time);
     progress.overtime().iter().for_each(|note| progress.say(note));
@@ -138,12 +139,15 @@ pub fn run(arguments: &Arguments, global: &Global, progress: &Progress) -> Resul
         let result = serde_json::json!({
             "event": "result", "error": error, "rounds": measured.rounds, "relative_residual": measured.residual,
             "guaranteed_bound": measured.bound, "stages": progress.spent(), "seconds": progress.seconds(),
-            "output": arguments.output, "illuminance": levels, "irradiance": values,
+            "output": arguments.output, "illuminance": levels, "illuminance_where_lit": lit, "irradiance": values,
         });
         return print(&result.to_string());
     }
     error.tell(progress);
     progress.say(&levels.to_string());
+    if levels.least <= 0.0 && lit.least > 0.0 {
+        progress.say(&format!("without the points that receive none: {lit}"));
+    }
     if let Some(wrote) = wrote {
         progress.say(&wrote);
     }

@@ -61,6 +61,11 @@ fn points_without_light_are_told_and_levels_summed_up() {
     assert!(lux[0] > 0.0 && lux[1] == 0.0 && lux[2] > 0.0, "{lux:?}");
     assert!(levels["least"] == 0.0 && levels["uniformity"] == 0.0 && levels["mean"].as_f64().unwrap() > 1.0);
     assert!(levels["largest"].as_f64() > levels["mean"].as_f64());
+    let lit = &result["illuminance_where_lit"];
+    let near = |value: &serde_json::Value, expected: f64| (value.as_f64().unwrap() / expected - 1.0).abs() < 1e-6;
+    assert!(lit["least"].as_f64() > Some(0.0) && near(&lit["mean"], 1.5 * levels["mean"].as_f64().unwrap()), "{lit}");
+    let run = room.run(["measure", "--points", "p.csv", "--error", "20%"]);
+    assert!(run.err.contains("without the points that receive none: mean "), "{run:?}");
 
     room.write("p.csv", "x,y,z,nx,ny,nz\n0.2,0.1,0.2,0,1,0\n");
     let run = room.run(["measure", "--points", "p.csv", "--error", "20%"]);

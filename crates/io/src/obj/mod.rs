@@ -51,7 +51,7 @@ pub fn load(file: &str, bytes: &[u8], source: &dyn Source, options: &LoadOptions
             _ => reader.line(number, keyword, rest, &mut library),
         }
     }
-    reader.report(&mut faults);
+    reader.report(library.is_missing, &mut faults);
 
     let mut assembly = Assembly::new(options);
     assembly.scene.up = options.up.unwrap_or_default();
@@ -345,10 +345,27 @@ impl<'a> Faces<'a> {
         index
     }
 
-    fn report(&self, faults: &mut Faults) {
-        for (name, line) in self.unknown_materials.iter().take(20) {
-            let what = format!("material '{name}' is in no library; its faces are grey of reflectance {}", mtl::GREY);
-            faults.warning(format!("{}:{line}", self.file), what, "add it to the material library");
+    /// Tells what was left out. Where a library is missing, which is told, so are all of its materials.
+    fn report(&self, is_library_missing: bool, faults: &mut Faults) {
+        let mut unknown: Vec<(&String, &usize)> = self.unknown_materials.iter().collect();
+        unknown.sort_by_key(|(_, line)| **line);
+        let grey = format!("grey of reflectance {}", mtl::GREY);
+        match unknown[..] {
+            [(_, line), _, ..] if is_library_missing => {
+                let some: Vec<String> = unknown.iter().take(5).map(|(name, _)| format!("'{name}'")).collect();
+                let more = if unknown.len() > some.len() { ", ..." } else { "" };
+                let (count, some) = (unknown.len(), some.join(", "));
+                let what = format!(
+                    "{count} materials are in no library that could be read: {some}{more}; their faces are {grey}"
+                );
+                faults.warning(format!("{}:{line}", self.file), what, "mend the material library");
+            }
+            _ => {
+                for (name, line) in unknown.into_iter().take(20) {
+                    let what = format!("material '{name}' is in no library; its faces are {grey}");
+                    faults.warning(format!("{}:{line}", self.file), what, "add it to the material library");
+                }
+            }
         }
         self.bad_indices.warn(self.file, "with a corner that does not exist; faces dropped", faults);
         self.too_short.warn(self.file, "with a face of fewer than 3 corners; dropped", faults);
@@ -400,6 +417,16 @@ mod tests {
             .collect();
         assert_eq!(objects, [("x", "red", 2), ("x", "no material", 1), ("y z", "red", 1)]);
         assert!(loaded.faults.to_string().contains("t.obj:14: material 'blue' is in no library"), "{}", loaded.faults);
+    }
+
+    /// Of a library that is missing all materials are, which is told once.
+    #[test]
+    fn materials_of_a_missing_library_are_told_together() {
+        let loaded = read(&format!("mtllib none.mtl\n{QUAD}usemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\n"));
+        let told = loaded.faults.to_string();
+        let together =
+            "t.obj:10: 2 materials are in no library that could be read: 'red', 'blue'; their faces are grey";
+        assert!(told.contains(together) && !told.contains("material 'blue' is in no library"), "{told}");
     }
 
     #[test]

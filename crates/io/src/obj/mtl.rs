@@ -24,12 +24,15 @@ pub(crate) struct Library<'a> {
     /// Texture by path; `None` where it could not be used.
     known: BTreeMap<String, Option<usize>>,
     budget: u64,
+    /// Whether a library that the file names could not be read.
+    pub is_missing: bool,
 }
 
 impl<'a> Library<'a> {
     pub fn new(source: &'a dyn Source) -> Library<'a> {
         let (materials, by_name, textures) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Library { source, materials, by_name, textures, known: BTreeMap::new(), budget: picture::MAX_TEXELS }
+        let (known, budget) = (BTreeMap::new(), picture::MAX_TEXELS);
+        Library { source, materials, by_name, textures, known, budget, is_missing: false }
     }
 
     /// Index of the material for faces that have none.
@@ -54,6 +57,7 @@ impl<'a> Library<'a> {
             Err(error) => {
                 let what = format!("material library {error}; its materials are grey");
                 faults.warning(place, what, error.hint());
+                self.is_missing = true;
                 return;
             }
         };
