@@ -425,7 +425,7 @@ mod tests {
         let loaded = read(&format!("mtllib none.mtl\n{QUAD}usemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\n"));
         let told = loaded.faults.to_string();
         let together =
-            "t.obj:10: 2 materials are in no library that could be read: 'red', 'blue'; their faces are grey";
+            "t.obj:11: 2 materials are in no library that could be read: 'red', 'blue'; their faces are grey";
         assert!(told.contains(together) && !told.contains("material 'blue' is in no library"), "{told}");
     }
 
