@@ -149,7 +149,7 @@ fn verdict(report: &Report) -> String {
     };
     let words = note(&format!(
         "The error is the root mean square difference of illuminance from the truth, over the root mean square \
-         illuminance, by area, of which what matters more to the eye than four times what its area tells counts for more. \
+         illuminance, by area; what eyes in the scene see much more of than its area tells, as a room on a wide site, counts for more. \
          An independent audit traced paths through the original scene at {}, two estimates of about {} \
          each, more where light is bright. It shares neither elements nor solver with the answer, so its error covers everything: elements, rays, \
          solver, interpolation, leaks of light. The band above spans the two bounds; each holds by itself with 95 % \
