@@ -6,7 +6,7 @@
 
 use radiosity_io::gltf_out::Encoding;
 use radiosity_scene::Bands;
-use radiosity_scene::display::srgb;
+use radiosity_scene::display::{linear, srgb};
 
 /// Classes of light to a factor of two, and how many there are.
 const TO_AN_OCTAVE: f32 = 8.0;
@@ -42,12 +42,8 @@ pub(crate) fn code(share: f32, encoding: Encoding) -> u8 {
 
 /// What a code stands for, as a part of the brightest light.
 fn decoded(code: f64, encoding: Encoding) -> f64 {
-    let s = code / 255.0;
-    match encoding {
-        Encoding::Linear => s,
-        Encoding::Srgb if s <= 0.04045 => s / 12.92,
-        Encoding::Srgb => ((s + 0.055) / 1.055).powf(2.4),
-    }
+    let share = code / 255.0;
+    if encoding == Encoding::Srgb { linear(share) } else { share }
 }
 
 impl Classes {

@@ -66,6 +66,16 @@ pub fn srgb(linear: f32) -> f32 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// The linear value of an sRGB one, both in 0..1; what [`srgb`] undoes.
+///
+/// ```
+/// use radiosity_scene::display::{linear, srgb};
+/// assert!((f64::from(srgb(linear(0.5) as f32)) - 0.5).abs() < 1e-6);
+/// ```
+pub fn linear(srgb: f64) -> f64 {
+    if srgb <= 0.04045 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,6 @@
 //! Pictures on surfaces: 8-bit texels as files carry them, decoded when looked up.
 
+use crate::display::linear;
 use glam::DVec2;
 use std::sync::LazyLock;
 
@@ -43,12 +44,8 @@ pub struct Texture {
 }
 
 /// Linear value of each sRGB byte (IEC 61966-2-1).
-static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|i| {
-        let s = i as f64 / 255.0;
-        (if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }) as f32
-    })
-});
+static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| linear(i as f64 / 255.0) as f32));
 
 impl Texture {
     /// Whether every texel is opaque.

@@ -1,6 +1,6 @@
 //! Reflectance and transmittance of an object's elements, as the file has them and as they are painted.
 
-use radiosity_scene::display::srgb;
+use radiosity_scene::display::{linear, srgb};
 use radiosity_scene::elements::places_over;
 use radiosity_scene::material::MAX_REFLECTANCE;
 use radiosity_scene::{Bands, Scene, Surface, Texture};
@@ -71,13 +71,9 @@ impl Paint {
 
 /// A picture whose linear colours are multiplied, as far as a picture goes.
 pub fn brighter(texture: &Texture, factor: Bands) -> Texture {
-    // IEC 61966-2-1, as pictures are read.
-    let linear = |byte: usize| {
-        let s = byte as f32 / 255.0;
-        if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
-    };
     let tables = factor.map(|factor| -> [u8; 256] {
-        std::array::from_fn(|byte| (255.0 * srgb((linear(byte) * factor).min(1.0))).round() as u8)
+        let scaled = |byte: usize| (linear(byte as f64 / 255.0) as f32 * factor).min(1.0);
+        std::array::from_fn(|byte| (255.0 * srgb(scaled(byte))).round() as u8)
     });
     let texel = |[r, g, b, a]: &[u8; 4]| {
         let [r, g, b] = [(0, r), (1, g), (2, b)].map(|(band, byte)| tables[band][usize::from(*byte)]);
