@@ -157,10 +157,10 @@ fn verdict(report: &Report) -> String {
         plural(error.points, "point"),
         plural(error.paths_per_estimate as usize, "path"),
     ));
-    let dimly = error.dimly().map_or(String::new(), |dimly| note(&format!("{dimly}.")));
+    let dimly = error.dimly().map_or(String::new(), |dimly| format!("<p class=\"lead\">But {dimly}.</p>"));
     format!(
         "<section class=\"verdict {class}\"><h2>{title}</h2><p class=\"lead\">{reached}{advice}{troubles}</p>\
-         {}{cards}{dimly}{words}</section>",
+         {dimly}{}{cards}{words}</section>",
         plot::gauge(error),
     )
 }
