@@ -112,13 +112,17 @@ pub(crate) fn mean([a, b]: [Bands; 2]) -> Bands {
     std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
 }
 
-/// Lets rays grow to so many times as many in the mean at most, and nowhere to more than 2^[`MOST_DOUBLINGS`].
-pub(crate) fn curb(times: &mut [f64], most: Option<f64>) {
+/// Lets `rays` grow to so many times as many in all at most, and nowhere to more than 2^[`MOST_DOUBLINGS`]; how many times as many they would be
+/// without that.
+pub(crate) fn curb(times: &mut [f64], rays: &[u32], most: Option<f64>) -> f64 {
     times.iter_mut().for_each(|t| *t = t.min(f64::from(1 << MOST_DOUBLINGS)));
-    let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
-    let Some(most) = most.filter(|most| mean > *most) else { return };
-    let part = (most - 1.0).max(0.0) / (mean - 1.0);
-    times.iter_mut().for_each(|t| *t = 1.0 + part * (*t - 1.0));
+    let had: f64 = rays.iter().map(|rays| f64::from(*rays)).sum();
+    let all = times.iter().zip(rays).map(|(t, rays)| t * f64::from(*rays)).sum::<f64>() / had.max(1.0);
+    if let Some(most) = most.filter(|most| all > *most) {
+        let part = (most - 1.0).max(0.0) / (all - 1.0);
+        times.iter_mut().for_each(|t| *t = 1.0 + part * (*t - 1.0));
+    }
+    all
 }
 
 /// How many times as many rays each place is to have, so that the root mean square of `noise` over `area` becomes `target`, lx, with the
@@ -189,9 +193,16 @@ mod tests {
         }
         // What a deadline allows is shared by those that grow.
         let mut curbed = times.clone();
-        curb(&mut curbed, Some(1.2));
-        let mean = curbed.iter().sum::<f64>() / curbed.len() as f64;
-        assert!((mean - 1.2).abs() < 1e-9 && curbed.iter().zip(&times).all(|(c, t)| *c >= 1.0 && c <= t), "{mean}");
+        let rays: Vec<u32> = (0..noise.len() as u32).map(|i| 1 + i % 2 * 9).collect();
+        let mean = |times: &[f64]| {
+            let all: f64 = times.iter().zip(&rays).map(|(t, rays)| t * f64::from(*rays)).sum();
+            all / f64::from(rays.iter().sum::<u32>())
+        };
+        let asked = curb(&mut curbed, &rays, Some(1.05));
+        let to = mean(&curbed);
+        assert!((to - 1.05).abs() < 1e-9 && curbed.iter().zip(&times).all(|(c, t)| *c >= 1.0 && c <= t), "{to}");
+        let doubled: Vec<f64> = times.iter().map(|t| t.min(32.0)).collect();
+        assert!(asked > 1.1 && (asked / mean(&doubled) - 1.0).abs() < 1e-9, "{asked}");
         // In the dark nothing is asked for.
         let dark = growth(&[0.0; 3], &[1.0; 3], &[0.0; 3], 0.0, 1.0);
         assert_eq!(dark, [1.0; 3]);

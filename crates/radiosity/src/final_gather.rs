@@ -39,8 +39,9 @@ const PLACE_BYTES: usize = 2000;
 /// looked up, which is mottled.
 const WIDER: [u32; 2] = [2, 4];
 
-/// First rays of each, and the fewest where there is little time. What is smooth needs no more: it shares with hundreds.
-const FIRST: usize = 32;
+/// First rays of each, and the fewest where there is little time. What is smooth shares with hundreds, but how far light is smooth has to be told from noise: with 32 instead a furnished
+/// room at 5 % takes 8.6 instead of 10.2 s and is 1.29 instead of 0.67 % off, all by pixels relative to their own light.
+const FIRST: usize = 128;
 const FEWEST: usize = 16;
 
 /// Most rays of each, in the mean: where light comes by bright paths that few rays meet, more would take minutes.
@@ -59,6 +60,9 @@ const VISIBLE: f64 = 4.0;
 
 /// Noise within this of what it is to be is not worth another step: what is shared falls more slowly than what each has.
 const ENOUGH: f64 = 1.2;
+
+/// A step that leaves more than this of the noise is the last: where bright paths are few, in a hall that has light through a door, 280 rays left as much as 45.
+const PAYS: f64 = 0.85;
 
 /// Steps by which rays become more, at most.
 const STEPS: u32 = 4;
@@ -87,9 +91,13 @@ const RIM: usize = 4;
 /// How often the noise of blocks is evened out with that of those around.
 const FARTHER: usize = 4;
 
-/// Squared ratio of what the field misses to the noise of that from which on it is believed, and of what pixels differ by from what lies between blocks: twice. With three times rooms whose field is wrong all over are
-/// a fifth farther off, with 1.7 a room with a bright gap had dark stains.
-const SURE: f32 = 4.0;
+/// How often what the field misses is evened out, so that it is told from noise where it is as wide as an element, as 25 blocks do not tell it. With once the
+/// furnished room is 0.77 instead of 0.70 % off, by 128 rays.
+const SCALES: u32 = 4;
+
+/// Squared ratio of what the field misses to the noise of that from which on it is believed, and of what pixels differ by from what lies between blocks. With 4 the
+/// furnished room is 0.70 % off, with 3 0.67, with 2 0.65, and with 2 there are more light dots on smooth walls, of up to 6 %.
+const SURE: f32 = 3.0;
 
 /// Least weight of a block's own place, where its tent ends before a pixel of the block: something is always there.
 const LEAST_WEIGHT: f32 = 1e-3;
@@ -233,12 +241,12 @@ pub(crate) fn indirect(
     let chosen = |blocks: &Blocks, light: &[Bands]| -> Vec<Bands> {
         blocks.blocks.iter().map(|block| light[block.chosen as usize]).collect()
     };
-    if let Some(Gathered { light: mut found, halves, .. }) = gathered {
+    if let Some(mut gathered) = gathered {
         let field = chosen(&blocks, &light);
         if !solution.options.looked_up {
-            blocks.unless_sure(&mut found, &field, &halves);
+            blocks.unless_sure(&mut gathered, &field);
         }
-        blocks.add(&found, &field, &mut light);
+        blocks.add(&gathered.light, &field, &mut light);
     }
     if let Some((closer, Gathered { light: mut found, noise, .. })) = closer.zip(closely) {
         closer.unless_clear(&mut found, &chosen(&closer, &light), &noise);
@@ -374,19 +382,30 @@ impl<'a> Blocks<'a> {
         values.par_iter().zip(&self.beside).map(mean).collect()
     }
 
-    /// Leaves in its place what the `field` of elements has, as far as what blocks around `found` does not tell more than their noise: what
-    /// bright paths leave, if few rays meet them, is seen on walls, and the field is smooth.
-    fn unless_sure(&self, found: &mut [Bands], field: &[Bands], halves: &[[Bands; 2]]) {
-        let off = |(halves, field): (&[Bands; 2], &Bands)| luminance(mean(*halves)) - luminance(*field);
-        let off = self.around(&halves.iter().zip(field).map(off).collect::<Vec<f32>>());
-        let noise: Vec<f32> = halves.iter().map(|halves| halved(*halves).powi(2)).collect();
-        let noise =
-            self.farther(noise).into_iter().zip(&self.beside).map(|(noise, beside)| noise / (beside.len() + 1) as f32);
-        let off = off.into_iter().map(|off| off * off);
-        self.mix(found, field, off.zip(noise).map(sure).collect());
+    /// Leaves in its place what the `field` of elements has, as far as what is `gathered` does not tell more than its noise: what
+    /// bright paths leave, if few rays meet them, is seen on walls, and the field is smooth. It may tell more by what a block shares with others, or by
+    /// what it and those around found, up to [`SCALES`] times as far.
+    fn unless_sure(&self, gathered: &mut Gathered, field: &[Bands]) {
+        let off = |(light, field): (Bands, &Bands)| luminance(light) - luminance(*field);
+        let shared = gathered.light.iter().copied().zip(field).map(off);
+        let noise: Vec<f32> = gathered.noise.iter().map(|noise| noise * noise).collect();
+        let noise = noise.iter().zip(self.farther(noise.clone())).map(|(own, farther)| own.max(farther));
+        let mut most_sure: Vec<f32> = shared.zip(noise).map(|(off, noise)| sure((off * off, noise))).collect();
+
+        let mut off: Vec<f32> = gathered.halves.iter().map(|halves| mean(*halves)).zip(field).map(off).collect();
+        let mut noise: Vec<f32> = gathered.halves.iter().map(|halves| halved(*halves).powi(2)).collect();
+        let farther = self.farther(noise.clone());
+        for scale in 1..=SCALES {
+            (off, noise) = (self.around(&off), self.around(&noise));
+            // Evened out so often, so many count as one.
+            let count = |own: usize| scale as f32 * (self.beside[own].len() + 1) as f32;
+            let sure = |own: usize| sure((off[own] * off[own], noise[own].max(farther[own]) / count(own)));
+            most_sure.iter_mut().enumerate().for_each(|(own, most)| *most = most.max(sure(own)));
+        }
+        self.mix(&mut gathered.light, field, most_sure);
     }
 
-    /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than twice their `noise`: they would
+    /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than their `noise` might ([`SURE`]): they would
     /// stand out as dots from what is beside them. The noise of blocks is in both, as the pixels that were theirs send the same rays again.
     fn unless_clear(&self, found: &mut [Bands], between: &[Bands], noise: &[f32]) {
         let off = |(found, between): (&Bands, &Bands)| (luminance(*found) - luminance(*between)).powi(2);
@@ -453,19 +472,21 @@ impl<'a> Blocks<'a> {
             let noise = |(pooled, noise): (&Pooled, &f32)| if pooled.own < 1.0 { pooled.spread } else { *noise };
             pooled.iter().zip(&found.noise).map(noise).collect()
         };
+        let mut left = f64::INFINITY;
         for step in 1..=STEPS {
             let spread = noise(&pooled, &found);
-            if step > 1 && wanted.of(&spread) <= ENOUGH * wanted.noise {
+            let before = std::mem::replace(&mut left, wanted.of(&spread));
+            if step > 1 && (left <= ENOUGH * wanted.noise || left > PAYS * before) {
                 break;
             }
             // Once the noisiest have had their share, what counts is the noise of all.
             let ceilings = if step == 1 { &wanted.ceilings } else { &none };
             let mut times = growth(&spread, &wanted.weights, ceilings, wanted.noise, GATHERED_POWER);
-            curb(&mut times, None);
+            let all = curb(&mut times, &found.rays, None);
             let had = found.rays.iter().map(|rays| f64::from(*rays)).sum::<f64>() / at.len() as f64;
             let mut most = MOST / had;
             if let Some(left) = pace::left(monitor) {
-                let all = (times.iter().sum::<f64>() / times.len() as f64).min(most);
+                let all = all.min(most);
                 // Rays are doubled or not, so that they may become √2 times as many as is said.
                 most = most.min((1.0 + pace::affordable(left, each) as f64 / had) * FRAC_1_SQRT_2);
                 is_whole &= all <= most;
@@ -473,7 +494,7 @@ impl<'a> Blocks<'a> {
             if most < WORTH {
                 break;
             }
-            curb(&mut times, Some(most));
+            curb(&mut times, &found.rays, Some(most));
             let before = found.rays.clone();
             let any = found.grow((&times, GATHERED_POWER), |own, rays| {
                 let at: Vec<Place> = own.iter().map(|i| places[*i]).collect();
@@ -508,7 +529,7 @@ impl<'a> Blocks<'a> {
         let mean_of = |of: &dyn Fn(f64) -> f64| size.iter().zip(&pixels).map(|(e, n)| n * of(*e)).sum::<f64>() / count;
         let (average, square) = (mean_of(&|e| e), mean_of(&|e| e * e));
         let counted: Vec<f64> = size.iter().map(|e| e.max(DARK * average)).collect();
-        let weight = |(e, n): (&f64, &f64)| 0.5 * n * (1.0 / square + 1.0 / (e * (e + average)));
+        let weight = |(e, n): (&f64, &f64)| 0.5 * n * (1.0 / square + 1.0 / (e * e));
         let weights: Vec<f64> = counted.iter().zip(&pixels).map(weight).collect();
         let asked = (NOISE * baked.error).min(MOST_NOISE);
         Wanted {
@@ -695,7 +716,7 @@ mod tests {
 
         let blocks = Blocks::new(&baked.solution, &view, &stations, 1);
         assert_eq!(blocks.side, 2);
-        let gathered = blocks.gathered(&baked, &stations, &[], false, &()).unwrap().unwrap();
+        let mut gathered = blocks.gathered(&baked, &stations, &[], false, &()).unwrap().unwrap();
         let (closer, _) = blocks.closer(&baked.solution, &stations, &gathered).unwrap();
         // What lies between blocks, over the field that the picture has: without pixels that gather all of it would be that.
         let solution = &baked.solution;
@@ -709,9 +730,8 @@ mod tests {
         let at = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
         let mut between: Vec<Bands> = stations.iter().map(at).collect();
         let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
-        let mut found = gathered.light;
-        blocks.unless_sure(&mut found, &field, &gathered.halves);
-        blocks.add(&found, &field, &mut between);
+        blocks.unless_sure(&mut gathered, &field);
+        blocks.add(&gathered.light, &field, &mut between);
         assert!((0..light.len()).all(|i| closer.gathers[i] || light[i] == between[i]));
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();
         let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
@@ -725,7 +745,7 @@ mod tests {
             (off / all).sqrt()
         };
         let [own, interpolated] = [off(&light), off(&between)];
-        assert!(some.len() > 500 && own < 0.03 && own < 0.6 * interpolated, "{own} instead of {interpolated}");
+        assert!(some.len() > 500 && own < 0.025 && own < 0.7 * interpolated, "{own} instead of {interpolated}");
     }
 
     /// Places in rows of [`SIDE`], each beside those of the 24 around that there are.
@@ -775,15 +795,44 @@ mod tests {
             let own = blocks.beside[i].iter().map(|other| mean(halves[*other as usize])[0]);
             [own.sum::<f32>() / blocks.beside[i].len() as f32; 3]
         };
-        let gathered: Vec<Bands> = (0..halves.len()).map(shared).collect();
+        let light: Vec<Bands> = (0..halves.len()).map(shared).collect();
+        let square = halves.iter().map(|halves| halved(*halves).powi(2)).sum::<f32>() / halves.len() as f32;
+        let noise = vec![(square / 24.0).sqrt(); halves.len()];
         let off =
             |light: &[Bands]| (light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>() / light.len() as f32).sqrt();
-        let mut with_right = gathered.clone();
-        blocks.unless_sure(&mut with_right, &vec![[1.0; 3]; halves.len()], &halves);
-        assert!(off(&with_right) < 0.2 * off(&gathered), "{} of {}", off(&with_right), off(&gathered));
+        let gathered =
+            || Gathered { light: light.clone(), halves: halves.clone(), noise: noise.clone(), is_whole: true };
+        let mut with_right = gathered();
+        blocks.unless_sure(&mut with_right, &vec![[1.0; 3]; halves.len()]);
+        assert!(off(&with_right.light) < 0.2 * off(&light), "{} of {}", off(&with_right.light), off(&light));
         let field = vec![[3.0; 3]; halves.len()];
-        let mut with_wrong = gathered.clone();
-        blocks.unless_sure(&mut with_wrong, &field, &halves);
-        assert!(off(&with_wrong) < 0.1 * off(&field), "{} of {}", off(&with_wrong), off(&field));
+        let mut with_wrong = gathered();
+        blocks.unless_sure(&mut with_wrong, &field);
+        assert!(off(&with_wrong.light) < 0.1 * off(&field), "{} of {}", off(&with_wrong.light), off(&field));
+    }
+
+    /// Where a field is wrong by less than 25 blocks tell, many more do if it is so all over, and what each shares does along an edge.
+    #[test]
+    fn the_field_gives_way_where_it_is_wrong_on_an_element_or_along_an_edge() {
+        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
+        let beside: Vec<_> = (0..SIDE * SIDE).map(beside).collect();
+        let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
+        let draw = |i: usize, k: u32| unit(hash(hash(i as u32) ^ k)) - 0.5;
+        let halves = |i: usize| [0, 1].map(|k| [1.0 + draw(i, k); 3]);
+        let left = |noise: f32, wrong: &dyn Fn(usize) -> bool| {
+            let mut gathered = Gathered {
+                light: vec![[1.0; 3]; SIDE * SIDE],
+                halves: (0..SIDE * SIDE).map(halves).collect(),
+                noise: vec![noise; SIDE * SIDE],
+                is_whole: true,
+            };
+            let field: Vec<Bands> = (0..SIDE * SIDE).map(|i| [if wrong(i) { 1.07 } else { 1.0 }; 3]).collect();
+            blocks.unless_sure(&mut gathered, &field);
+            let own: Vec<f32> = (0..SIDE * SIDE).filter(|i| wrong(*i)).map(|i| gathered.light[i][0] - 1.0).collect();
+            own.iter().sum::<f32>() / own.len() as f32
+        };
+        let [element, edge] = [left(0.1, &|_| true), left(0.01, &|i| i % SIDE == 20)];
+        assert!(element < 0.04 && edge < 0.06, "{element} {edge}");
+        assert!(left(0.1, &|i| i % SIDE == 20) > 0.06);
     }
 }

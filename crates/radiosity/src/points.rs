@@ -202,12 +202,12 @@ impl<A: Asked> Light<A> {
         let [for_gathered, for_direct] = POWERS;
         let spread = |pooled: &[Pooled]| -> Vec<f32> { pooled.iter().map(|p| p.spread).collect() };
         let mut times = growth(&spread(&self.lit), &weights, &ceilings, of_direct, for_direct);
-        curb(&mut times, most);
+        curb(&mut times, &self.direct.rays, most);
         let more_direct = self.direct.grow((&times, for_direct), |own, rays| {
             solution.direct_of(&asked.some(solution, own, set), &A::shadowing(rays as usize), monitor)
         })?;
         let mut times = growth(&spread(&self.pooled), &weights, &ceilings, of_gathered, for_gathered);
-        curb(&mut times, most);
+        curb(&mut times, &self.gathered.rays, most);
         let more_gathered = self.gathered.grow((&times, for_gathered), |own, rays| {
             let halves = solution.halves_of(&asked.some(solution, own, set), rays as usize, monitor)?;
             Ok(Lit::sampled(halves.into_iter().map(|half| mean(half.light)).collect()))

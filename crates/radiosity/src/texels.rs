@@ -113,7 +113,7 @@ pub(crate) fn light(
     let [most_gathered, most_shadow] = usual_rays(error).map(|rays| pace::left(monitor).map(|_| rays as f64));
     let spread: Vec<f32> = lit.iter().map(|p| p.spread).collect();
     let mut times = growth(&spread, &area, &ceilings, DIRECT_NOISE * error * size, DIRECT_POWER);
-    curb(&mut times, most_shadow.map(|most| most / shadow as f64));
+    curb(&mut times, &direct.rays, most_shadow.map(|most| most / shadow as f64));
     direct.grow((&times, DIRECT_POWER), |own, rays| {
         solution.direct_by(&of(own), &shadowing(rays as usize), 3, monitor)
     })?;
@@ -121,7 +121,7 @@ pub(crate) fn light(
     if let Some(gathered) = &mut gathered {
         let spread: Vec<f32> = indirect.iter().map(|p| p.spread).collect();
         let mut times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * size, GATHERED_POWER);
-        curb(&mut times, most_gathered.map(|most| most / first as f64));
+        curb(&mut times, &gathered.rays, most_gathered.map(|most| most / first as f64));
         gathered.grow((&times, GATHERED_POWER), |own, rays| {
             let halves = solution.halves_at(&of(own), rays as usize, 1, monitor)?;
             Ok(Lit::sampled(halves.into_iter().map(|half| mean(half.light)).collect()))
