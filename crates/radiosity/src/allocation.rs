@@ -112,14 +112,14 @@ pub(crate) fn mean([a, b]: [Bands; 2]) -> Bands {
     std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
 }
 
-/// Lets `rays` grow to so many times as many in all at most, and nowhere to more than 2^[`MOST_DOUBLINGS`]; how many times as many they would be
-/// without that.
+/// Lets `rays` grow nowhere to more than 2^[`MOST_DOUBLINGS`] times as many, and to `most` times as many in all at most; how many times as many they would be
+/// without the latter.
 pub(crate) fn curb(times: &mut [f64], rays: &[u32], most: Option<f64>) -> f64 {
     times.iter_mut().for_each(|t| *t = t.min(f64::from(1 << MOST_DOUBLINGS)));
     let had: f64 = rays.iter().map(|rays| f64::from(*rays)).sum();
     let all = times.iter().zip(rays).map(|(t, rays)| t * f64::from(*rays)).sum::<f64>() / had.max(1.0);
     if let Some(most) = most.filter(|most| all > *most) {
-        let part = (most - 1.0).max(0.0) / (all - 1.0);
+        let part = if all > 1.0 { (most - 1.0).max(0.0) / (all - 1.0) } else { 0.0 };
         times.iter_mut().for_each(|t| *t = 1.0 + part * (*t - 1.0));
     }
     all

@@ -61,7 +61,8 @@ const VISIBLE: f64 = 4.0;
 /// Noise within this of what it is to be is not worth another step: what is shared falls more slowly than what each has.
 const ENOUGH: f64 = 1.2;
 
-/// A step that leaves more than this of the noise is the last: where bright paths are few, in a hall that has light through a door, 280 rays left as much as 45.
+/// A step that leaves more than this of the noise is the last, if it is a small one, too: in a hall that has light through a door 280 rays left as much as 45, and a picture of it takes 19
+/// instead of 25 s where steps go on that take half of what is promised, and is as near.
 const PAYS: f64 = 0.85;
 
 /// Steps by which rays become more, at most.
@@ -257,9 +258,9 @@ pub(crate) fn indirect(
     Ok((light, is_whole))
 }
 
-/// How much of a difference is believed, by its square and that of its noise (a Wiener filter, as in `radiosity_view::pool`).
+/// How much of a difference is believed, by its noise (a Wiener filter, as in `radiosity_view::pool`).
 fn sure((off, noise): (f32, f32)) -> f32 {
-    if off > 0.0 { (1.0 - SURE * noise / off).max(0.0) } else { 0.0 }
+    if off != 0.0 { (1.0 - SURE * (noise / off).powi(2)).max(0.0) } else { 0.0 }
 }
 
 /// What two halves of the rays of a place found.
@@ -386,23 +387,27 @@ impl<'a> Blocks<'a> {
     /// bright paths leave, if few rays meet them, is seen on walls, and the field is smooth. It may tell more by what a block shares with others, or by
     /// what it and those around found, up to [`SCALES`] times as far.
     fn unless_sure(&self, gathered: &mut Gathered, field: &[Bands]) {
-        let off = |(light, field): (Bands, &Bands)| luminance(light) - luminance(*field);
-        let shared = gathered.light.iter().copied().zip(field).map(off);
-        let noise: Vec<f32> = gathered.noise.iter().map(|noise| noise * noise).collect();
-        let noise = noise.iter().zip(self.farther(noise.clone())).map(|(own, farther)| own.max(farther));
-        let mut most_sure: Vec<f32> = shared.zip(noise).map(|(off, noise)| sure((off * off, noise))).collect();
+        let beyond = |(light, field): (Bands, &Bands)| luminance(light) - luminance(*field);
+        let shared = gathered.light.iter().copied().zip(field).map(beyond);
+        let farther = self.farther(&gathered.noise);
+        let noise = gathered.noise.iter().zip(farther).map(|(own, farther)| own.max(farther));
+        let mut most_sure: Vec<f32> = shared.zip(noise).map(sure).collect();
 
-        let mut off: Vec<f32> = gathered.halves.iter().map(|halves| mean(*halves)).zip(field).map(off).collect();
-        let mut noise: Vec<f32> = gathered.halves.iter().map(|halves| halved(*halves).powi(2)).collect();
-        let farther = self.farther(noise.clone());
+        let halves = &gathered.halves;
+        let mut off: Vec<f32> = halves.iter().map(|halves| mean(*halves)).zip(field).map(beyond).collect();
+        // Half of what halves differ by has the noise of their mean, however many blocks it is evened out over. One that met a bright path tells of it alone.
+        let mut apart: Vec<f32> = halves.iter().map(|[a, b]| 0.5 * (luminance(*a) - luminance(*b))).collect();
+        let mut squares: Vec<f32> = apart.iter().map(|apart| apart * apart).collect();
         for scale in 1..=SCALES {
-            (off, noise) = (self.around(&off), self.around(&noise));
-            // Evened out so often, so many count as one.
-            let count = |own: usize| scale as f32 * (self.beside[own].len() + 1) as f32;
-            let sure = |own: usize| sure((off[own] * off[own], noise[own].max(farther[own]) / count(own)));
-            most_sure.iter_mut().enumerate().for_each(|(own, most)| *most = most.max(sure(own)));
+            (off, apart, squares) = (self.around(&off), self.around(&apart), self.around(&squares));
+            let farther = self.farther(&apart);
+            let noise = |own: usize| {
+                let count = scale as f32 * (self.beside[own].len() + 1) as f32;
+                farther[own].max((squares[own] / count).sqrt())
+            };
+            most_sure.iter_mut().enumerate().for_each(|(own, most)| *most = most.max(sure((off[own], noise(own)))));
         }
-        self.mix(&mut gathered.light, field, most_sure);
+        self.mix(&mut gathered.light, field, &most_sure);
     }
 
     /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than their `noise` might ([`SURE`]): they would
@@ -410,20 +415,22 @@ impl<'a> Blocks<'a> {
     fn unless_clear(&self, found: &mut [Bands], between: &[Bands], noise: &[f32]) {
         let off = |(found, between): (&Bands, &Bands)| (luminance(*found) - luminance(*between)).powi(2);
         let off = self.around(&found.iter().zip(between).map(off).collect::<Vec<f32>>());
-        let noise = self.farther(noise.iter().map(|noise| noise * noise).collect());
-        self.mix(found, between, off.into_iter().zip(noise).map(sure).collect());
-    }
-
-    /// Means from farther around, as there need not be a bright path in a window where there might be.
-    fn farther(&self, noise: Vec<f32>) -> Vec<f32> {
-        (0..FARTHER).fold(noise, |noise, _| self.around(&noise))
+        let noise = self.farther(noise);
+        let sure: Vec<f32> = off.into_iter().map(f32::sqrt).zip(noise).map(sure).collect();
+        self.mix(found, between, &sure);
     }
 
     /// Leaves of what was `found` so much as is sure, and `others` for the rest.
-    fn mix(&self, found: &mut [Bands], others: &[Bands], sure: Vec<f32>) {
-        for ((found, other), sure) in found.iter_mut().zip(others).zip(self.around(&sure)) {
+    fn mix(&self, found: &mut [Bands], others: &[Bands], sure: &[f32]) {
+        for ((found, other), sure) in found.iter_mut().zip(others).zip(self.around(sure)) {
             *found = std::array::from_fn(|k| other[k] + sure * (found[k] - other[k]));
         }
+    }
+
+    /// Root mean square noise farther around, as there need not be a bright path in a window where there might be.
+    fn farther(&self, noise: &[f32]) -> Vec<f32> {
+        let squares = noise.iter().map(|noise| noise * noise).collect();
+        (0..FARTHER).fold(squares, |squares: Vec<f32>, _| self.around(&squares)).into_iter().map(f32::sqrt).collect()
     }
 
     /// Light that the chosen places gather, and share with each other and with what a `rim` around them found; nothing where time does not do for the fewest rays, unless this `is_least` that is done.
@@ -472,35 +479,32 @@ impl<'a> Blocks<'a> {
             let noise = |(pooled, noise): (&Pooled, &f32)| if pooled.own < 1.0 { pooled.spread } else { *noise };
             pooled.iter().zip(&found.noise).map(noise).collect()
         };
-        let mut left = f64::INFINITY;
+        let mut noise_left = f64::INFINITY;
         for step in 1..=STEPS {
             let spread = noise(&pooled, &found);
-            let before = std::mem::replace(&mut left, wanted.of(&spread));
-            if step > 1 && (left <= ENOUGH * wanted.noise || left > PAYS * before) {
+            let noise_before = std::mem::replace(&mut noise_left, wanted.of(&spread));
+            if step > 1 && (noise_left <= ENOUGH * wanted.noise || noise_left > PAYS * noise_before) {
                 break;
             }
             // Once the noisiest have had their share, what counts is the noise of all.
             let ceilings = if step == 1 { &wanted.ceilings } else { &none };
             let mut times = growth(&spread, &wanted.weights, ceilings, wanted.noise, GATHERED_POWER);
-            let all = curb(&mut times, &found.rays, None);
             let had = found.rays.iter().map(|rays| f64::from(*rays)).sum::<f64>() / at.len() as f64;
-            let mut most = MOST / had;
-            if let Some(left) = pace::left(monitor) {
-                let all = all.min(most);
-                // Rays are doubled or not, so that they may become √2 times as many as is said.
-                most = most.min((1.0 + pace::affordable(left, each) as f64 / had) * FRAC_1_SQRT_2);
-                is_whole &= all <= most;
-            }
-            if most < WORTH {
+            let most = MOST / had;
+            // Rays are doubled or not, so that they may become √2 times as many as is said.
+            let there_is_time = |left| (1.0 + pace::affordable(left, each) as f64 / had) * FRAC_1_SQRT_2;
+            let allowed = pace::left(monitor).map_or(most, |left| most.min(there_is_time(left)));
+            let all = curb(&mut times, &found.rays, Some(allowed));
+            is_whole &= all.min(most) <= allowed.max(1.0);
+            if allowed < WORTH {
                 break;
             }
-            curb(&mut times, &found.rays, Some(most));
-            let before = found.rays.clone();
+            let sent = found.rays.clone();
             let any = found.grow((&times, GATHERED_POWER), |own, rays| {
                 let at: Vec<Place> = own.iter().map(|i| places[*i]).collect();
                 let more = solution.halves_at(&at, rays as usize, step, monitor)?;
                 for (&i, more) in own.iter().zip(&more) {
-                    let part = rays as f32 / (before[i] + rays) as f32;
+                    let part = rays as f32 / (sent[i] + rays) as f32;
                     for (own, new) in halves[i].iter_mut().zip(more.light) {
                         *own = std::array::from_fn(|k| own[k] + part * (new[k] - own[k]));
                     }
@@ -643,7 +647,7 @@ mod tests {
         };
         let gathered = off(&|i| light[i]);
         let field = off(&|i| baked.field.at(stations[i].place.triangle as usize, stations[i].uv, stations[i].side));
-        assert!(gathered < 0.55 * field && gathered < 0.05, "{gathered} instead of {field}");
+        assert!(gathered < 0.45 * field && gathered < 0.04, "{gathered} instead of {field}");
     }
 
     fn stations(view: &ViewRays) -> Vec<Station> {
@@ -796,8 +800,12 @@ mod tests {
             [own.sum::<f32>() / blocks.beside[i].len() as f32; 3]
         };
         let light: Vec<Bands> = (0..halves.len()).map(shared).collect();
-        let square = halves.iter().map(|halves| halved(*halves).powi(2)).sum::<f32>() / halves.len() as f32;
-        let noise = vec![(square / 24.0).sqrt(); halves.len()];
+        // And told by these alone.
+        let told = |i: usize| {
+            let own = blocks.beside[i].iter().map(|other| halved(halves[*other as usize]).powi(2));
+            own.sum::<f32>().sqrt() / blocks.beside[i].len() as f32
+        };
+        let noise: Vec<f32> = (0..halves.len()).map(told).collect();
         let off =
             |light: &[Bands]| (light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>() / light.len() as f32).sqrt();
         let gathered =
@@ -811,18 +819,16 @@ mod tests {
         assert!(off(&with_wrong.light) < 0.1 * off(&field), "{} of {}", off(&with_wrong.light), off(&field));
     }
 
-    /// Where a field is wrong by less than 25 blocks tell, many more do if it is so all over, and what each shares does along an edge.
+    /// Where a field is wrong by less than 25 blocks tell, many more do if it is so on all of an element, and what each shares does at the end of a wall.
     #[test]
-    fn the_field_gives_way_where_it_is_wrong_on_an_element_or_along_an_edge() {
+    fn the_field_gives_way_where_it_is_wrong_on_an_element_or_at_an_edge() {
         let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
         let beside: Vec<_> = (0..SIDE * SIDE).map(beside).collect();
         let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
-        let draw = |i: usize, k: u32| unit(hash(hash(i as u32) ^ k)) - 0.5;
-        let halves = |i: usize| [0, 1].map(|k| [1.0 + draw(i, k); 3]);
         let left = |noise: f32, wrong: &dyn Fn(usize) -> bool| {
             let mut gathered = Gathered {
                 light: vec![[1.0; 3]; SIDE * SIDE],
-                halves: (0..SIDE * SIDE).map(halves).collect(),
+                halves: (0..SIDE * SIDE).map(apart).collect(),
                 noise: vec![noise; SIDE * SIDE],
                 is_whole: true,
             };
@@ -831,8 +837,62 @@ mod tests {
             let own: Vec<f32> = (0..SIDE * SIDE).filter(|i| wrong(*i)).map(|i| gathered.light[i][0] - 1.0).collect();
             own.iter().sum::<f32>() / own.len() as f32
         };
-        let [element, edge] = [left(0.1, &|_| true), left(0.01, &|i| i % SIDE == 20)];
-        assert!(element < 0.04 && edge < 0.06, "{element} {edge}");
-        assert!(left(0.1, &|i| i % SIDE == 20) > 0.06);
+        let is_edge = |i: usize| i % SIDE < 3;
+        let [element, edge] = [left(0.1, &|_| true), left(0.01, &is_edge)];
+        assert!(element < 0.04 && edge < 0.02, "{element} {edge}");
+        assert!(left(0.1, &is_edge) > edge + 0.02);
+    }
+
+    /// Blocks that have nobody beside them, and those of a strip, know no better of their noise than they do; where the field is right it takes most of it.
+    #[test]
+    fn blocks_alone_and_in_a_strip_are_as_noisy_as_they_are() {
+        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
+        let strip = |own: u32| -> SmallVec<[u32; 24]> {
+            (own.saturating_sub(AROUND)..=own + AROUND).filter(|i| *i != own && *i < (SIDE * SIDE) as u32).collect()
+        };
+        for (reach, most) in [(0, 0.78), (1, 0.28)] {
+            let beside =
+                (0..(SIDE * SIDE) as u32).map(|i| if reach == 0 { SmallVec::new() } else { strip(i) }).collect();
+            let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
+            let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(apart).collect();
+            let light: Vec<Bands> = halves.iter().map(|halves| mean(*halves)).collect();
+            let noise = halves.iter().map(|halves| halved(*halves)).collect();
+            let off = |light: &[Bands]| light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>().sqrt();
+            let before = off(&light);
+            let mut gathered = Gathered { light, halves, noise, is_whole: true };
+            blocks.unless_sure(&mut gathered, &vec![[1.0; 3]; SIDE * SIDE]);
+            let left = off(&gathered.light) / before;
+            assert!(left < most, "{reach}: {left}");
+        }
+    }
+
+    /// Two halves around 1.
+    fn apart(i: usize) -> [Bands; 2] {
+        [0, 1].map(|k| [0.5 + unit(hash(hash(i as u32) ^ k)); 3])
+    }
+
+    /// What places count by the noise of each relative to its light is the same for some that have ten times as much as others.
+    #[test]
+    fn noise_counts_relative_to_each_places_own_light() {
+        let scene = cornell_box();
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let solve = SolveOptions { element_size: Some(0.14), ..SolveOptions::default() };
+        let options = BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() };
+        let baked = bake(&tracer, &options, &()).unwrap();
+        let view = ViewRays::new(&tracer, &scene.cameras[0], 16, 16);
+        let stations = stations(&view);
+        let blocks = Blocks::new(&baked.solution, &view, &stations, 1);
+        let places: Vec<Place> = blocks.blocks.iter().map(|block| stations[block.chosen as usize].place).collect();
+        // Far more than the direct light there.
+        let level = |i: usize| if i.is_multiple_of(50) { 1e9 } else { 1e8 };
+        let pooled: Vec<Pooled> = (0..places.len()).map(|i| Pooled::alone([level(i); 3], 0.0)).collect();
+        let wanted = blocks.wanted(&baked, &places, &pooled);
+        let part = |own: usize| wanted.weights[own] * f64::from(level(own)).powi(2);
+        let square = (0..places.len()).map(|i| f64::from(level(i)).powi(2)).sum::<f64>() / places.len() as f64;
+        let expected = |own: usize| 0.5 * (f64::from(level(own)).powi(2) / square + 1.0);
+        for own in [0, 1] {
+            assert!((part(own) / expected(own) - 1.0).abs() < 0.02, "{} {}", part(own), expected(own));
+        }
     }
 }
