@@ -301,14 +301,14 @@ fn tell(report: &Report, delta_e: Option<f64>, global: &Global, progress: &Progr
     let (solution, light) = (&report.solution, &report.illuminance);
     let memory = report.peak_memory_mb.map_or(String::new(), |mb| format!(", {mb:.0} MB"));
     progress.say(&format!(
-        "{} elements in {} cells x {} rays, {:.1} s{memory}; illuminance of the lit area: mean {:.4} lx, 95 % of it above {:.4}, brightest {:.4}",
+        "{} elements in {} cells x {} rays, {:.1} s{memory}; illuminance of the lit area: mean {} lx, 95 % of it above {}, brightest {}",
         solution.elements,
         solution.cells,
         solution.rays_per_cell,
         report.time.seconds,
-        light.mean,
-        light.low,
-        light.largest,
+        numbers::level(light.mean),
+        numbers::level(light.low),
+        numbers::level(light.largest),
     ));
     for output in &report.outputs {
         progress.say(&format!("wrote {output}"));

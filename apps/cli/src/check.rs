@@ -5,7 +5,7 @@ use crate::numbers::place;
 use crate::output::print;
 use crate::{Failure, Global, faults};
 use clap::Args;
-use radiosity::{Material, PointLightKind, Severity, counted};
+use radiosity::{Material, PointLightKind, Severity, counted, listed};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
@@ -53,12 +53,17 @@ fn summary(input: &Input) -> String {
     let used: BTreeSet<usize> = scene.objects.iter().map(|object| object.material).collect();
     let of_used = |is: fn(&Material) -> bool| used.iter().filter(|k| is(&scene.materials[**k])).count();
     let also = |n: usize, what: &str| if n > 0 { format!(", {n} {what}") } else { String::new() };
+    let unused: Vec<usize> = (0..scene.materials.len()).filter(|k| !used.contains(k)).collect();
+    let name = |k: &usize| match scene.materials[*k].name.as_str() {
+        "" => format!("material {}", k + 1),
+        name => format!("'{name}'"),
+    };
     lines.push(format!(
         "  {}, {} of them luminous{}{}",
         count(scene.materials.len(), "material"),
         of_used(Material::emits),
         also(of_used(Material::transmits), "letting light through"),
-        also(scene.materials.len() - used.len(), "on no surface")
+        also(unused.len(), &format!("on no surface ({})", listed(unused.iter().map(name))))
     ));
     let (lights, cameras) = (count(scene.lights.len(), "light"), count(scene.cameras.len(), "camera"));
     lines.push(format!("  {lights} without area, {cameras}"));

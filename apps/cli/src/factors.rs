@@ -9,7 +9,7 @@ use radiosity::io::vs3::NoRow;
 use radiosity::io::{FactorFormat, FactorRows, FactorTable, Grouping, LoadOptions, Vs3, enclosure_of, load_enclosure};
 use radiosity::transport::row::{MOST_CELLS, RowMethod};
 use radiosity::transport::{FormFactorMethod, FormFactors};
-use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Severity, counted};
+use radiosity::{Doubt, Elements, Enclosure, Factors, FactorsOptions, Faults, Mesh, Severity, counted, listed};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -392,15 +392,6 @@ fn name(enclosure: &Enclosure, surface: usize) -> String {
     }
 }
 
-/// Names that are listed before "and N more".
-const LISTED: usize = 6;
-
-fn list(mut names: Vec<String>) -> String {
-    let more = names.len().saturating_sub(LISTED);
-    names.truncate(LISTED);
-    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
-}
-
 /// Which surfaces of a .vs3 have which rows, where that is not plain: masks have rows without being surfaces of the
 /// exchange, others are surfaces of the file and have none.
 fn rows_of_vs3(vs3: &Vs3, enclosure: &Enclosure, is_script_f: bool) -> Vec<String> {
@@ -410,7 +401,7 @@ fn rows_of_vs3(vs3: &Vs3, enclosure: &Enclosure, is_script_f: bool) -> Vec<Strin
     if !vs3.masks.is_empty() {
         let masks = vs3.masks.iter().map(|m| format!("{} upon {}", title(m.number, &m.name), name(enclosure, m.base)));
         let rows = counted(vs3.masks.len(), "mask", "masks");
-        lines.push(format!("{rows}: {}", list(masks.collect())));
+        lines.push(format!("{rows}: {}", listed(masks)));
         let (surfaces, all) = (enclosure.surfaces.len(), enclosure.surfaces.len() + vs3.masks.len());
         lines.push(if is_script_f {
             format!(
@@ -434,7 +425,7 @@ fn rows_of_vs3(vs3: &Vs3, enclosure: &Enclosure, is_script_f: bool) -> Vec<Strin
             "null surface has no row: what it covers",
             "null surfaces have no rows: what they cover",
         );
-        lines.push(format!("{count} is no part of the base and lets nothing through ({})", list(nulls)));
+        lines.push(format!("{count} is no part of the base and lets nothing through ({})", listed(nulls.into_iter())));
     }
     let parts = vs3.rowless.iter().filter_map(|r| match r.why {
         NoRow::Part(whole) => Some(format!("{} with {}", title(r.number, &r.name), name(enclosure, whole))),
@@ -443,7 +434,7 @@ fn rows_of_vs3(vs3: &Vs3, enclosure: &Enclosure, is_script_f: bool) -> Vec<Strin
     let parts: Vec<String> = parts.collect();
     if !parts.is_empty() {
         let count = counted(parts.len(), "surface is", "surfaces are");
-        lines.push(format!("{count} combined with another and counted there ({})", list(parts)));
+        lines.push(format!("{count} combined with another and counted there ({})", listed(parts.into_iter())));
     }
     let obstructions = of(|why| *why == NoRow::Obstruction).count();
     if obstructions > 0 {
@@ -571,11 +562,8 @@ fn blind_rows(enclosure: &Enclosure, found: &Factors) -> Option<String> {
     let told = |surface: &usize| {
         format!("{} ({})", name(enclosure, *surface), Why::of(enclosure, &found.factors, *surface).told())
     };
-    let first: Vec<String> = blind.iter().take(LISTED).map(told).collect();
-    let more = blind.len() - first.len();
     let rows = counted(blind.len(), "row is all zero: its surface sees", "rows are all zero: their surfaces see");
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    Some(format!("{rows} no other: {}{more}", first.join(", ")))
+    Some(format!("{rows} no other: {}", listed(blind.iter().map(told))))
 }
 
 /// A sum as it is written with seven decimals: that of nothing is 0, and not −0 as IEEE 754 has it.

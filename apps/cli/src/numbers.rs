@@ -18,7 +18,17 @@ pub fn place(p: [f64; 3]) -> String {
 
 /// A number above zero to two digits, or to its whole ones.
 pub fn rough(x: f64) -> String {
-    fixed(x, (1.0 - x.log10().floor()).clamp(0.0, 20.0) as usize)
+    rounded(x, 2)
+}
+
+/// An illuminance to four digits, or to its whole ones.
+pub fn level(x: f64) -> String {
+    if x > 0.0 { rounded(x, 4) } else { fixed(x, 0) }
+}
+
+/// A number above zero to some digits, or to its whole ones.
+fn rounded(x: f64, digits: i32) -> String {
+    fixed(x, (f64::from(digits) - 1.0 - x.log10().floor()).clamp(0.0, 20.0) as usize)
 }
 
 /// A length of one unit, in metres.
@@ -164,6 +174,10 @@ mod tests {
         assert_eq!(unit("mm"), Ok(0.001));
         assert!(unit("0").is_err());
         assert_eq!([rough(0.000_512_7), rough(0.96), rough(47.31), rough(5236.1)], ["0.00051", "0.96", "47", "5236"]);
+        assert_eq!(
+            [level(0.0), level(0.051_234_9), level(365.9765), level(27_832.9)],
+            ["0", "0.05123", "366.0", "27833"]
+        );
         assert!(exposure("-7.5").is_ok() && exposure("nan").is_err() && exposure("1e300").is_err());
     }
 }

@@ -80,7 +80,7 @@ pub mod display {
 pub use radiosity_scene::{
     AlphaMode, Bands, Camera, EdgeSide, Elements, Enclosure, EnclosureSurface, Facet, Fault, Faults, Material, Mesh,
     Object, PointLight, PointLightKind, Projection, Scene, Severity, Side, Sky, SkyPatches, Surface, Texture,
-    TextureRef, Transmission, Up, Wrap, counted, luminance, size,
+    TextureRef, Transmission, Up, Wrap, counted, listed, luminance, size,
 };
 pub use radiosity_solve as solve;
 pub use radiosity_trace::{Found, Place, Tracer};

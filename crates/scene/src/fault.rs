@@ -48,6 +48,16 @@ pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
+/// Names that are listed before "and N more".
+const LISTED: usize = 6;
+
+/// The first names with commas between, and how many there are more.
+pub fn listed(mut names: impl ExactSizeIterator<Item = String>) -> String {
+    let first: Vec<String> = names.by_ref().take(LISTED).collect();
+    let more = names.len();
+    first.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}
+
 /// Bytes in the largest unit (powers of 1024) of which there is one at least, to two digits: `size(1 << 20)` is "1.0 MB".
 pub fn size(bytes: usize) -> String {
     let units = [("TB", 40), ("GB", 30), ("MB", 20), ("KB", 10)];

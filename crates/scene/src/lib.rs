@@ -25,7 +25,7 @@ pub use curve::Curve;
 pub use element_facets::ElementError;
 pub use elements::{CellWidth, ElementId, Elements};
 pub use facet::{Enclosure, EnclosureSurface, Facet, FacetError};
-pub use fault::{Fault, Faults, Severity, counted, size};
+pub use fault::{Fault, Faults, Severity, counted, listed, size};
 pub use light::{PointLight, PointLightKind};
 pub use material::{AlphaMode, Material, TextureRef, Transmission};
 pub use mesh::{EdgeSide, Mesh, Side, Weld};

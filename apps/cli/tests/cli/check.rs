@@ -44,7 +44,7 @@ fn check_lists_what_is_there() {
     room.write("m.mtl", "newmtl wall\nKd 1 1 1\nnewmtl lamp\nKd 1 1 1\nKe 9 9 9\n");
     room.write("some.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl wall\nf 1 2 3\n");
     let said = room.run(["check", "some.obj"]).out;
-    assert!(said.contains("2 materials, 0 of them luminous, 1 on no surface\n"), "{said}");
+    assert!(said.contains("2 materials, 0 of them luminous, 1 on no surface ('lamp')\n"), "{said}");
 }
 
 #[test]
