@@ -11,6 +11,7 @@
 
 use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, halved, mean};
 use crate::answer::Station;
+use crate::believed::Neighbours;
 use crate::pace::{self, Cost};
 use crate::pixels::{DARK, lies_on, pixel, seen};
 use crate::points::evened;
@@ -89,17 +90,6 @@ const AROUND: u32 = 2;
 /// line. With half and with twice as many nothing was tried.
 const RIM: usize = 4;
 
-/// How often the noise of blocks is evened out with that of those around.
-const FARTHER: usize = 4;
-
-/// How often what the field misses is evened out, so that it is told from noise where it is as wide as an element, as 25 blocks do not tell it. With once the
-/// furnished room is 0.77 instead of 0.70 % off (with 4 for [`SURE`]).
-const SCALES: u32 = 4;
-
-/// Squared ratio of what the field misses to the noise of that from which on it is believed, and of what pixels differ by from what lies between blocks. With 4 the
-/// furnished room is 0.71 % off, with 3 0.68, with 2 0.65, and with 2 there are more light dots on smooth walls, of up to 6 %.
-const SURE: f32 = 3.0;
-
 /// Least weight of a block's own place, where its tent ends before a pixel of the block: something is always there.
 const LEAST_WEIGHT: f32 = 1e-3;
 
@@ -111,15 +101,15 @@ struct Block {
 }
 
 /// Light by block.
-struct Gathered {
+pub(crate) struct Gathered {
     /// What all shared, lx per band.
-    light: Vec<Bands>,
+    pub light: Vec<Bands>,
     /// What either half of the rays of each found.
-    halves: Vec<[Bands; 2]>,
+    pub halves: Vec<[Bands; 2]>,
     /// Standard errors of the light, lx.
-    noise: Vec<f32>,
+    pub noise: Vec<f32>,
     /// Whether there was time for all rays.
-    is_whole: bool,
+    pub is_whole: bool,
 }
 
 /// Noise that is asked of blocks.
@@ -175,8 +165,8 @@ struct Blocks<'a> {
     /// Pixels along the side of a square.
     side: u32,
     blocks: Vec<Block>,
-    /// Those of the same surface in the squares around, by block.
-    beside: Vec<SmallVec<[u32; 24]>>,
+    /// Those in the squares around.
+    beside: Neighbours,
     /// Whether a place gathers, by number.
     gathers: Vec<bool>,
 }
@@ -245,22 +235,17 @@ pub(crate) fn indirect(
     if let Some(mut gathered) = gathered {
         let field = chosen(&blocks, &light);
         if !solution.options.looked_up {
-            blocks.unless_sure(&mut gathered, &field);
+            blocks.beside.unless_sure(&mut gathered, &field);
         }
         blocks.add(&gathered.light, &field, &mut light);
     }
     if let Some((closer, Gathered { light: mut found, noise, .. })) = closer.zip(closely) {
-        closer.unless_clear(&mut found, &chosen(&closer, &light), &noise);
+        closer.beside.unless_clear(&mut found, &chosen(&closer, &light), &noise);
         for (block, found) in closer.blocks.iter().zip(found) {
             block.places.iter().for_each(|place| light[*place as usize] = found);
         }
     }
     Ok((light, is_whole))
-}
-
-/// How much of a difference is believed, by its noise (a Wiener filter, as in `radiosity_view::pool`).
-fn sure((off, noise): (f32, f32)) -> f32 {
-    if off != 0.0 { (1.0 - SURE * (noise / off).powi(2)).max(0.0) } else { 0.0 }
 }
 
 /// What two halves of the rays of a place found.
@@ -315,7 +300,7 @@ impl<'a> Blocks<'a> {
             let is_beside = |other: &u32| *other != own && lies_on(place, seen(view, blocks[*other as usize].chosen));
             squares.filter_map(|square| at.get(&square)).flatten().copied().filter(is_beside).collect()
         };
-        let beside = (0..blocks.len() as u32).into_par_iter().zip(&blocks).map(beside).collect();
+        let beside = Neighbours((0..blocks.len() as u32).into_par_iter().zip(&blocks).map(beside).collect());
         Blocks { view, side, blocks, beside, gathers }
     }
 
@@ -338,13 +323,13 @@ impl<'a> Blocks<'a> {
                 let is_clear = off > CLEAR * gathered.noise[own].hypot(gathered.noise[other]);
                 if is_clear { off / all.max(f32::MIN_POSITIVE) } else { 0.0 }
             };
-            self.beside[own].iter().map(|other| to(*other as usize)).fold(0.0, f32::max)
+            self.beside.0[own].iter().map(|other| to(*other as usize)).fold(0.0, f32::max)
         };
         let steepness: Vec<f32> = (0..self.blocks.len()).into_par_iter().map(steepness).collect();
         let is_steep = |own: usize| steepness[own] > STEEP;
         // Those of which few around are steep as well are unlike each other by their noise, and would be dots.
         let is_backed = |own: &usize| {
-            let beside = &self.beside[*own];
+            let beside = &self.beside.0[*own];
             let backing = beside.iter().filter(|other| is_steep(**other as usize)).count();
             backing as f32 >= BACKED * beside.len() as f32
         };
@@ -364,7 +349,7 @@ impl<'a> Blocks<'a> {
             return None;
         }
         for _ in 0..RIM {
-            let reaches = |own: usize| is_near[own] || self.beside[own].iter().any(|other| is_near[*other as usize]);
+            let reaches = |own: usize| is_near[own] || self.beside.0[own].iter().any(|other| is_near[*other as usize]);
             is_near = (0..is_near.len()).into_par_iter().map(reaches).collect();
         }
         let is_rim = |own: &usize| is_near[*own] && !gathers[self.blocks[*own].chosen as usize];
@@ -372,65 +357,6 @@ impl<'a> Blocks<'a> {
         // All together no more than there were: memory was asked for as many.
         let rim = (0..is_near.len()).filter(is_rim).take(left).map(found).collect();
         Some((Blocks::of(self.view, gathers, 1, self.blocks.len()), rim))
-    }
-
-    /// Means over each block and those beside it.
-    fn around(&self, values: &[f32]) -> Vec<f32> {
-        let mean = |(own, beside): (&f32, &SmallVec<[u32; 24]>)| {
-            let sum = beside.iter().map(|other| values[*other as usize]).sum::<f32>() + own;
-            sum / (beside.len() + 1) as f32
-        };
-        values.par_iter().zip(&self.beside).map(mean).collect()
-    }
-
-    /// Leaves in its place what the `field` of elements has, as far as what is `gathered` does not tell more than its noise: what
-    /// bright paths leave, if few rays meet them, is seen on walls, and the field is smooth. It may tell more by what a block shares with others, or by
-    /// what it and those around found, up to [`SCALES`] times as far.
-    fn unless_sure(&self, gathered: &mut Gathered, field: &[Bands]) {
-        let beyond = |(light, field): (Bands, &Bands)| luminance(light) - luminance(*field);
-        let shared = gathered.light.iter().copied().zip(field).map(beyond);
-        let farther = self.farther(&gathered.noise);
-        let noise = gathered.noise.iter().zip(farther).map(|(own, farther)| own.max(farther));
-        let mut most_sure: Vec<f32> = shared.zip(noise).map(sure).collect();
-
-        let halves = &gathered.halves;
-        let mut off: Vec<f32> = halves.iter().map(|halves| mean(*halves)).zip(field).map(beyond).collect();
-        // Half of what halves differ by has the noise of their mean, however many blocks it is evened out over. One that met a bright path tells of it alone.
-        let mut apart: Vec<f32> = halves.iter().map(|[a, b]| 0.5 * (luminance(*a) - luminance(*b))).collect();
-        let mut squares: Vec<f32> = apart.iter().map(|apart| apart * apart).collect();
-        for scale in 1..=SCALES {
-            (off, apart, squares) = (self.around(&off), self.around(&apart), self.around(&squares));
-            let farther = self.farther(&apart);
-            let noise = |own: usize| {
-                let count = scale as f32 * (self.beside[own].len() + 1) as f32;
-                farther[own].max((squares[own] / count).sqrt())
-            };
-            most_sure.iter_mut().enumerate().for_each(|(own, most)| *most = most.max(sure((off[own], noise(own)))));
-        }
-        self.mix(&mut gathered.light, field, &most_sure);
-    }
-
-    /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than their `noise` might ([`SURE`]): they would
-    /// stand out as dots from what is beside them. The noise of blocks is in both, as the pixels that were theirs send the same rays again.
-    fn unless_clear(&self, found: &mut [Bands], between: &[Bands], noise: &[f32]) {
-        let off = |(found, between): (&Bands, &Bands)| (luminance(*found) - luminance(*between)).powi(2);
-        let off = self.around(&found.iter().zip(between).map(off).collect::<Vec<f32>>());
-        let noise = self.farther(noise);
-        let sure: Vec<f32> = off.into_iter().map(f32::sqrt).zip(noise).map(sure).collect();
-        self.mix(found, between, &sure);
-    }
-
-    /// Leaves of what was `found` so much as is sure, and `others` for the rest.
-    fn mix(&self, found: &mut [Bands], others: &[Bands], sure: &[f32]) {
-        for ((found, other), sure) in found.iter_mut().zip(others).zip(self.around(sure)) {
-            *found = std::array::from_fn(|k| other[k] + sure * (found[k] - other[k]));
-        }
-    }
-
-    /// Root mean square noise farther around, as there need not be a bright path in a window where there might be.
-    fn farther(&self, noise: &[f32]) -> Vec<f32> {
-        let squares = noise.iter().map(|noise| noise * noise).collect();
-        (0..FARTHER).fold(squares, |squares: Vec<f32>, _| self.around(&squares)).into_iter().map(f32::sqrt).collect()
     }
 
     /// Light that the chosen places gather, and share with each other and with what a `rim` around them found; nothing where time does not do for the fewest rays, unless this `is_least` that is done.
@@ -550,7 +476,7 @@ impl<'a> Blocks<'a> {
             let of_place = |&place: &u32| {
                 let mut seen = Between::default();
                 seen.add(self.tent(place, block.chosen).max(LEAST_WEIGHT), found[number], field[number]);
-                for other in self.beside[number].iter().map(|other| *other as usize) {
+                for other in self.beside.0[number].iter().map(|other| *other as usize) {
                     seen.add(self.tent(place, self.blocks[other].chosen), found[other], field[other]);
                 }
                 (place, seen.with(light[place as usize]))
@@ -622,9 +548,7 @@ mod tests {
         let scene = cornell_box();
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let solve = SolveOptions { element_size: Some(0.14), ..SolveOptions::default() };
-        let options = BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() };
-        let baked = bake(&tracer, &options, &()).unwrap();
+        let baked = bake(&tracer, &coarse(SolveOptions::default().memory), &()).unwrap();
         let view = ViewRays::new(&tracer, &scene.cameras[0], 64, 64);
         let stations = stations(&view);
         let (light, is_whole) = indirect(&baked, &view, &stations, &()).unwrap();
@@ -648,6 +572,12 @@ mod tests {
         let gathered = off(&|i| light[i]);
         let field = off(&|i| baked.field.at(stations[i].place.triangle as usize, stations[i].uv, stations[i].side));
         assert!(gathered < 0.45 * field && gathered < 0.04, "{gathered} instead of {field}");
+    }
+
+    /// Elements of the box as wide as a quarter of its walls.
+    fn coarse(memory: usize) -> BakeOptions {
+        let solve = SolveOptions { element_size: Some(0.14), memory, ..SolveOptions::default() };
+        BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() }
     }
 
     fn stations(view: &ViewRays) -> Vec<Station> {
@@ -709,9 +639,7 @@ mod tests {
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
         // So little memory that blocks are two pixels wide.
-        let solve = SolveOptions { element_size: Some(0.14), memory: 30 << 20, ..SolveOptions::default() };
-        let options = BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() };
-        let baked = bake(&tracer, &options, &()).unwrap();
+        let baked = bake(&tracer, &coarse(30 << 20), &()).unwrap();
         let view = ViewRays::new(&tracer, &scene.cameras[0], 128, 128);
         let stations = stations(&view);
         let (light, is_whole) = indirect(&baked, &view, &stations, &()).unwrap();
@@ -734,7 +662,7 @@ mod tests {
         let at = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
         let mut between: Vec<Bands> = stations.iter().map(at).collect();
         let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
-        blocks.unless_sure(&mut gathered, &field);
+        blocks.beside.unless_sure(&mut gathered, &field);
         blocks.add(&gathered.light, &field, &mut between);
         assert!((0..light.len()).all(|i| closer.gathers[i] || light[i] == between[i]));
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();
@@ -752,134 +680,13 @@ mod tests {
         assert!(some.len() > 500 && own < 0.025 && own < 0.7 * interpolated, "{own} instead of {interpolated}");
     }
 
-    /// Places in rows of [`SIDE`], each beside those of the 24 around that there are.
-    const SIDE: usize = 40;
-
-    fn beside(own: usize) -> SmallVec<[u32; 24]> {
-        let near = |other: &usize| {
-            let apart = |a: usize, b: usize| a.abs_diff(b) <= 2;
-            *other != own && apart(own % SIDE, other % SIDE) && apart(own / SIDE, other / SIDE)
-        };
-        (0..SIDE * SIDE).filter(near).map(|other| other as u32).collect()
-    }
-
-    /// Where pixels find but noise around what lies between blocks, that stays; what is finer than that, and more than noise, is theirs.
-    #[test]
-    fn pixels_show_what_is_clearly_theirs() {
-        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
-        let beside: Vec<_> = (0..SIDE * SIDE).map(beside).collect();
-        let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
-        let draw = |i: usize| 0.2 * (unit(hash(i as u32)) - 0.5);
-        // Of this standard error.
-        let noise = vec![0.2 / 12f32.sqrt(); SIDE * SIDE];
-        let off = |detail: f32| {
-            let truth = |i: usize| 1.0 + if i.is_multiple_of(2) { detail } else { -detail };
-            let mut found: Vec<Bands> = (0..SIDE * SIDE).map(|i| [truth(i) + draw(i); 3]).collect();
-            blocks.unless_clear(&mut found, &vec![[1.0; 3]; SIDE * SIDE], &noise);
-            let squares = found.iter().enumerate().map(|(i, e)| (e[0] - truth(i)).powi(2));
-            (squares.sum::<f32>() / found.len() as f32).sqrt() / noise[0]
-        };
-        assert!(off(0.0) < 0.1 && off(0.5) < 1.2, "{} {}", off(0.0), off(0.5));
-    }
-
-    /// Bright paths that one half in two hundred meets do not show where the field is right; where it is wrong what was gathered stays.
-    #[test]
-    fn the_field_gives_way_to_what_is_sure() {
-        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
-        let beside: Vec<_> = (0..SIDE * SIDE).map(beside).collect();
-        let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
-        let draw = |i: usize, k: u32| unit(hash(hash(i as u32) ^ k));
-        let half = |i: usize, k: u32| {
-            let bright = if draw(i, k + 2) < 0.005 { 8.0 } else { 0.0 };
-            [1.0 + 0.2 * (draw(i, k) - 0.5) + bright; 3]
-        };
-        let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(|i| [half(i, 0), half(i, 1)]).collect();
-        // As if all shared with those beside them.
-        let shared = |i: usize| -> Bands {
-            let own = blocks.beside[i].iter().map(|other| mean(halves[*other as usize])[0]);
-            [own.sum::<f32>() / blocks.beside[i].len() as f32; 3]
-        };
-        let light: Vec<Bands> = (0..halves.len()).map(shared).collect();
-        // And told by these alone.
-        let told = |i: usize| {
-            let own = blocks.beside[i].iter().map(|other| halved(halves[*other as usize]).powi(2));
-            own.sum::<f32>().sqrt() / blocks.beside[i].len() as f32
-        };
-        let noise: Vec<f32> = (0..halves.len()).map(told).collect();
-        let off =
-            |light: &[Bands]| (light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>() / light.len() as f32).sqrt();
-        let gathered =
-            || Gathered { light: light.clone(), halves: halves.clone(), noise: noise.clone(), is_whole: true };
-        let mut with_right = gathered();
-        blocks.unless_sure(&mut with_right, &vec![[1.0; 3]; halves.len()]);
-        assert!(off(&with_right.light) < 0.2 * off(&light), "{} of {}", off(&with_right.light), off(&light));
-        let field = vec![[3.0; 3]; halves.len()];
-        let mut with_wrong = gathered();
-        blocks.unless_sure(&mut with_wrong, &field);
-        assert!(off(&with_wrong.light) < 0.1 * off(&field), "{} of {}", off(&with_wrong.light), off(&field));
-    }
-
-    /// Where a field is wrong by less than 25 blocks tell, many more do if it is so on all of an element, and what each shares does at the end of a wall.
-    #[test]
-    fn the_field_gives_way_where_it_is_wrong_on_an_element_or_at_an_edge() {
-        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
-        let beside: Vec<_> = (0..SIDE * SIDE).map(beside).collect();
-        let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
-        let left = |noise: f32, wrong: &dyn Fn(usize) -> bool| {
-            let mut gathered = Gathered {
-                light: vec![[1.0; 3]; SIDE * SIDE],
-                halves: (0..SIDE * SIDE).map(apart).collect(),
-                noise: vec![noise; SIDE * SIDE],
-                is_whole: true,
-            };
-            let field: Vec<Bands> = (0..SIDE * SIDE).map(|i| [if wrong(i) { 1.07 } else { 1.0 }; 3]).collect();
-            blocks.unless_sure(&mut gathered, &field);
-            let own: Vec<f32> = (0..SIDE * SIDE).filter(|i| wrong(*i)).map(|i| gathered.light[i][0] - 1.0).collect();
-            own.iter().sum::<f32>() / own.len() as f32
-        };
-        let is_edge = |i: usize| i % SIDE < 3;
-        let [element, edge] = [left(0.1, &|_| true), left(0.01, &is_edge)];
-        assert!(element < 0.04 && edge < 0.02, "{element} {edge}");
-        assert!(left(0.1, &is_edge) > edge + 0.02);
-    }
-
-    /// Blocks that have nobody beside them, and those of a strip, know no better of their noise than they do; where the field is right it takes most of it.
-    #[test]
-    fn blocks_alone_and_in_a_strip_are_as_noisy_as_they_are() {
-        let view = ViewRays { width: 1, height: 1, grid: 1, seen: Vec::new(), sky: Vec::new() };
-        let strip = |own: u32| -> SmallVec<[u32; 24]> {
-            (own.saturating_sub(AROUND)..=own + AROUND).filter(|i| *i != own && *i < (SIDE * SIDE) as u32).collect()
-        };
-        for (reach, most) in [(0, 0.78), (1, 0.28)] {
-            let beside =
-                (0..(SIDE * SIDE) as u32).map(|i| if reach == 0 { SmallVec::new() } else { strip(i) }).collect();
-            let blocks = Blocks { view: &view, side: 1, blocks: Vec::new(), beside, gathers: Vec::new() };
-            let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(apart).collect();
-            let light: Vec<Bands> = halves.iter().map(|halves| mean(*halves)).collect();
-            let noise = halves.iter().map(|halves| halved(*halves)).collect();
-            let off = |light: &[Bands]| light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>().sqrt();
-            let before = off(&light);
-            let mut gathered = Gathered { light, halves, noise, is_whole: true };
-            blocks.unless_sure(&mut gathered, &vec![[1.0; 3]; SIDE * SIDE]);
-            let left = off(&gathered.light) / before;
-            assert!(left < most, "{reach}: {left}");
-        }
-    }
-
-    /// Two halves around 1.
-    fn apart(i: usize) -> [Bands; 2] {
-        [0, 1].map(|k| [0.5 + unit(hash(hash(i as u32) ^ k)); 3])
-    }
-
     /// What places count by the noise of each relative to its light is the same for some that have ten times as much as others.
     #[test]
     fn noise_counts_relative_to_each_places_own_light() {
         let scene = cornell_box();
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        let solve = SolveOptions { element_size: Some(0.14), ..SolveOptions::default() };
-        let options = BakeOptions { error: 0.02, solve, rounds: 0, ..BakeOptions::default() };
-        let baked = bake(&tracer, &options, &()).unwrap();
+        let baked = bake(&tracer, &coarse(SolveOptions::default().memory), &()).unwrap();
         let view = ViewRays::new(&tracer, &scene.cameras[0], 16, 16);
         let stations = stations(&view);
         let blocks = Blocks::new(&baked.solution, &view, &stations, 1);

@@ -16,6 +16,7 @@
 mod allocation;
 pub mod answer;
 pub mod bake;
+mod believed;
 mod canvas;
 pub mod compare;
 mod cornell;
