@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 /// Elements are flat where normals differ from theirs by less than this cosine, that of half a degree: light that comes from
 /// one side changes by less than one percent.
-const FLAT: f64 = 0.99996;
+pub(crate) const FLAT: f64 = 0.99996;
 
 /// Fewest rays that gather for an element of a divided cell: what is left of 128 for the smallest of 16.
 const FEWEST_RAYS: usize = 8;

@@ -4,14 +4,15 @@
 //!
 //! One place in a block of a few pixels gathers for each surface that the block shows; those of a plane share what they found ([`Planes`]), and the
 //! noisy ones send more rays ([`crate::allocation`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers, shares with what blocks around found, and shows
-//! what differs from what lies between these by more than noise. Surfaces that are not flat have the continuous field of the elements:
-//! places with normals of their own share with no other, and would be as grainy as each is noisy.
+//! what differs from what lies between these by more than noise. Places of curved surfaces, with normals of their own, share with no others, and would be as grainy as each is noisy: of them is shown what stands out from
+//! noise by itself or together with those around, and of what lies between them only what these found beyond the field, as light that changes with the normal need not be within it.
 //!
 //! Places do not share over walls, but blocks know none: beside a wall that is narrower than a block, light of one side may show on the other, for its pixels.
 
 use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, halved, mean};
 use crate::answer::Station;
 use crate::believed::Neighbours;
+use crate::field::FLAT;
 use crate::pace::{self, Cost};
 use crate::pixels::{DARK, lies_on, pixel, seen};
 use crate::points::evened;
@@ -19,7 +20,7 @@ use crate::{Baked, Error, Monitor, Solution, Timed};
 use radiosity_scene::{Bands, Side, luminance};
 use radiosity_trace::Place;
 use radiosity_view::picture::{ViewRays, shading_normal};
-use radiosity_view::{FLAT, Finding, Planes, Pooled};
+use radiosity_view::{Finding, Planes, Pooled};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::cmp::Reverse;
@@ -90,6 +91,11 @@ const AROUND: u32 = 2;
 /// line. With half and with twice as many nothing was tried.
 const RIM: usize = 4;
 
+/// Curved surfaces go on from one place to another where normals turn by less than this cosine, of 30 degrees, and both see the other this near to their horizon, by its sine: within blocks of a few pixels,
+/// at the limb of a ball or on a thin pole, they turn by as much. With cosines of 0.7 and 0.95 pictures are as near.
+const TURNED: f64 = 0.866;
+const RISEN: f64 = 0.5;
+
 /// Least weight of a block's own place, where its tent ends before a pixel of the block: something is always there.
 const LEAST_WEIGHT: f32 = 1e-3;
 
@@ -108,6 +114,8 @@ pub(crate) struct Gathered {
     pub halves: Vec<[Bands; 2]>,
     /// Standard errors of the light, lx.
     pub noise: Vec<f32>,
+    /// Half of what halves differ by in it, lx.
+    pub apart: Vec<f32>,
     /// Whether there was time for all rays.
     pub is_whole: bool,
 }
@@ -152,11 +160,24 @@ impl Between {
     }
 
     /// Light at the place by that of the field there.
-    fn with(&self, field: Bands) -> Bands {
-        let [low, high] = self.range.unwrap_or([field; 2]);
-        // Light beyond single precision must not end in a panic.
-        std::array::from_fn(|k| (field[k] + self.beyond[k] / self.total).max(low[k]).min(high[k]))
+    fn over(&self, field: Bands) -> Bands {
+        std::array::from_fn(|k| (field[k] + self.beyond[k] / self.total).max(0.0))
     }
+
+    /// The same, never more or less than these found: where the field is steep it knows no better.
+    fn within(&self, field: Bands) -> Bands {
+        let [low, high] = self.range.unwrap_or([field; 2]);
+        let light = self.over(field);
+        // Light beyond single precision must not end in a panic.
+        std::array::from_fn(|k| light[k].max(low[k]).min(high[k]))
+    }
+}
+
+/// What a place gathers with, and shares by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shape {
+    Flat,
+    Curved,
 }
 
 /// What of a picture gathers, and the rest.
@@ -167,8 +188,8 @@ struct Blocks<'a> {
     blocks: Vec<Block>,
     /// Those in the squares around.
     beside: Neighbours,
-    /// Whether a place gathers, by number.
-    gathers: Vec<bool>,
+    /// Places that gather, by number.
+    gathers: Vec<Option<Shape>>,
 }
 
 /// Indirect light of all that is seen, and whether there was time to gather it as it should be. Of a solution by a matrix of form factors the field is
@@ -184,9 +205,8 @@ pub(crate) fn indirect(
 ) -> Result<(Vec<Bands>, bool), Error> {
     let solution = &baked.solution;
     let mut blocks = Blocks::new(solution, view, stations, 1);
-    // Within a time limit the field has its part of the time: by what it alone shows, or half where it is shown everywhere.
-    let curved = blocks.gathers.iter().filter(|gathers| !**gathers).count() as f64 / stations.len().max(1) as f64;
-    let part = if solution.options.looked_up { 1.0 - curved } else { 0.5 };
+    // Within a time limit the field has half of the time where it is shown.
+    let part = if solution.options.looked_up { 1.0 } else { 0.5 };
     let own = match pace::left(monitor) {
         Some(left) => Timed::new(monitor, Duration::from_secs_f64(part * left)),
         None => Timed::unlimited(monitor),
@@ -215,7 +235,8 @@ pub(crate) fn indirect(
     let closer = closer.map(|(closer, _)| closer);
     is_whole &= closer.is_none() || closely.as_ref().is_some_and(|gathered| gathered.is_whole);
     // Elements that are only looked up make no field that is worth a look.
-    let is_shown = |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.gathers[place]);
+    let is_shown =
+        |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.gathers[place].is_some());
     let mut looks = vec![0; solution.elements.cells()];
     for Station { place, uv, side } in (0..stations.len()).filter(|place| is_shown(*place)).map(|i| stations[i]) {
         if let Some(element) = solution.elements.at(place.triangle, uv.x as f32, uv.y as f32, side) {
@@ -234,8 +255,12 @@ pub(crate) fn indirect(
     };
     if let Some(mut gathered) = gathered {
         let field = chosen(&blocks, &light);
+        let curved = blocks.beside.by_scales(&gathered, &field);
         if !solution.options.looked_up {
             blocks.beside.unless_sure(&mut gathered, &field);
+        }
+        for own in (0..field.len()).filter(|own| !blocks.is_flat(*own)) {
+            gathered.light[own] = curved[own];
         }
         blocks.add(&gathered.light, &field, &mut light);
     }
@@ -248,10 +273,26 @@ pub(crate) fn indirect(
     Ok((light, is_whole))
 }
 
+/// Whether a flat surface, or a curved one, goes on from one place of a picture to another.
+fn goes_on(view: &ViewRays, gathers: &[Option<Shape>], a: u32, b: u32) -> bool {
+    let [shape, other] = [a, b].map(|place| gathers[place as usize]);
+    let (a, b) = (seen(view, a), seen(view, b));
+    shape == other
+        && match shape {
+            Some(Shape::Curved) => {
+                let between = b.place.point - a.place.point;
+                let risen = between.dot(a.place.normal).abs().max(between.dot(b.place.normal).abs());
+                a.behind == b.behind && a.place.normal.dot(b.place.normal) > TURNED && risen <= RISEN * between.length()
+            }
+            _ => lies_on(a, b),
+        }
+}
+
 /// What two halves of the rays of a place found.
 fn finding(Station { place, side, .. }: &Station, halves: [Bands; 2]) -> Finding {
     let (point, triangle) = (place.point, place.triangle as usize);
-    Finding { point, triangle, side: *side, light: mean(halves), noise: halved(halves), weight: 1.0 }
+    let noise = halved(halves).copysign(luminance(halves[0]) - luminance(halves[1]));
+    Finding { point, triangle, side: *side, light: mean(halves), noise, weight: 1.0 }
 }
 
 /// Whether the triangle of a station receives with its own normal all over.
@@ -264,19 +305,21 @@ fn is_flat(solution: &Solution, Station { place, side, .. }: &Station) -> bool {
 
 impl<'a> Blocks<'a> {
     fn new(solution: &Solution, view: &'a ViewRays, stations: &[Station], wider: u32) -> Blocks<'a> {
-        let gathers = |station: &Station| solution.options.form_factors.is_none() && is_flat(solution, station);
-        let gathers: Vec<bool> = stations.par_iter().map(gathers).collect();
-        let count = gathers.iter().filter(|gathers| **gathers).count() as f64;
+        let shape = |station: &Station| if is_flat(solution, station) { Shape::Flat } else { Shape::Curved };
+        let gathers = |station: &Station| solution.options.form_factors.is_none().then(|| shape(station));
+        let gathers: Vec<Option<Shape>> = stations.par_iter().map(gathers).collect();
+        let count = gathers.iter().flatten().count() as f64;
         let most = PLACES.min((solution.memory_allowed() / PLACE_BYTES) as f64).max(LEAST_PLACES);
         Blocks::of(view, gathers, wider * (count / most).sqrt().ceil().max(1.0) as u32, SURFACES * most as usize)
     }
 
     /// Those of places that gather, of so many pixels to a side, no more than `most`.
-    fn of(view: &'a ViewRays, mut gathers: Vec<bool>, side: u32, most: usize) -> Blocks<'a> {
+    fn of(view: &'a ViewRays, mut gathers: Vec<Option<Shape>>, side: u32, most: usize) -> Blocks<'a> {
         let first = |row: u32| view.seen.partition_point(|seen| seen.pixel < row * view.width) as u32;
         let of_row = |row: u32| {
-            let places = (first(row * side)..first((row + 1) * side)).filter(|place| gathers[*place as usize]);
-            Block::all(view, places, side)
+            let places =
+                (first(row * side)..first((row + 1) * side)).filter(|place| gathers[*place as usize].is_some());
+            Block::all(view, &gathers, places, side)
         };
         let rows: Vec<Vec<Block>> = (0..view.height.div_ceil(side)).into_par_iter().map(of_row).collect();
         let mut blocks: Vec<Block> = rows.into_iter().flatten().collect();
@@ -284,7 +327,7 @@ impl<'a> Blocks<'a> {
         if blocks.len() > most {
             blocks.sort_by_key(|block| (Reverse(block.places.len()), block.chosen));
             for block in blocks.drain(most..) {
-                block.places.iter().for_each(|place| gathers[*place as usize] = false);
+                block.places.iter().for_each(|place| gathers[*place as usize] = None);
             }
             blocks.sort_by_key(|block| block.chosen);
         }
@@ -296,15 +339,15 @@ impl<'a> Blocks<'a> {
             let [x, y] = block.square;
             let low = [x, y].map(|k| k.saturating_sub(AROUND));
             let squares = (low[1]..=y + AROUND).flat_map(|y| (low[0]..=x + AROUND).map(move |x| [x, y]));
-            let place = seen(view, block.chosen);
-            let is_beside = |other: &u32| *other != own && lies_on(place, seen(view, blocks[*other as usize].chosen));
+            let is_beside =
+                |other: &u32| *other != own && goes_on(view, &gathers, block.chosen, blocks[*other as usize].chosen);
             squares.filter_map(|square| at.get(&square)).flatten().copied().filter(is_beside).collect()
         };
         let beside = Neighbours((0..blocks.len() as u32).into_par_iter().zip(&blocks).map(beside).collect());
         Blocks { view, side, blocks, beside, gathers }
     }
 
-    /// Blocks of a pixel where what these gathered is steep, no more than there are of these, where it is steepest, and what others around them found; nothing where it is nowhere.
+    /// Blocks of a pixel where what these gathered of flat surfaces is steep, no more than there are of these, where it is steepest, and what others around them found; nothing where it is nowhere.
     fn closer(
         &self,
         solution: &Solution,
@@ -326,7 +369,7 @@ impl<'a> Blocks<'a> {
             self.beside.0[own].iter().map(|other| to(*other as usize)).fold(0.0, f32::max)
         };
         let steepness: Vec<f32> = (0..self.blocks.len()).into_par_iter().map(steepness).collect();
-        let is_steep = |own: usize| steepness[own] > STEEP;
+        let is_steep = |own: usize| steepness[own] > STEEP && self.is_flat(own);
         // Those of which few around are steep as well are unlike each other by their noise, and would be dots.
         let is_backed = |own: &usize| {
             let beside = &self.beside.0[*own];
@@ -335,7 +378,7 @@ impl<'a> Blocks<'a> {
         };
         let mut steep: Vec<usize> = (0..self.blocks.len()).filter(|own| is_steep(*own) && is_backed(own)).collect();
         steep.sort_by(|a, b| steepness[*b].total_cmp(&steepness[*a]).then(a.cmp(b)));
-        let mut gathers = vec![false; self.gathers.len()];
+        let mut gathers = vec![None; self.gathers.len()];
         let mut left = self.blocks.len();
         let mut is_near = vec![false; self.blocks.len()];
         for own in &steep {
@@ -343,7 +386,7 @@ impl<'a> Blocks<'a> {
             let Some(rest) = left.checked_sub(places.len()) else { break };
             left = rest;
             is_near[*own] = true;
-            places.iter().for_each(|place| gathers[*place as usize] = true);
+            places.iter().for_each(|place| gathers[*place as usize] = Some(Shape::Flat));
         }
         if steep.is_empty() {
             return None;
@@ -352,7 +395,7 @@ impl<'a> Blocks<'a> {
             let reaches = |own: usize| is_near[own] || self.beside.0[own].iter().any(|other| is_near[*other as usize]);
             is_near = (0..is_near.len()).into_par_iter().map(reaches).collect();
         }
-        let is_rim = |own: &usize| is_near[*own] && !gathers[self.blocks[*own].chosen as usize];
+        let is_rim = |own: &usize| is_near[*own] && gathers[self.blocks[*own].chosen as usize].is_none();
         let found = |own: usize| finding(&stations[self.blocks[own].chosen as usize], gathered.halves[own]);
         // All together no more than there were: memory was asked for as many.
         let rim = (0..is_near.len()).filter(is_rim).take(left).map(found).collect();
@@ -444,8 +487,9 @@ impl<'a> Blocks<'a> {
         }
         // What paths find beyond what they look up may be less than nothing.
         let light = pooled.iter().map(|p| p.light.map(|e| e.max(0.0))).collect();
+        let apart = pooled.iter().map(|pooled| pooled.noise).collect();
         let noise = noise(&pooled, &found);
-        Ok(Some(Gathered { light, halves, noise, is_whole }))
+        Ok(Some(Gathered { light, halves, noise, apart, is_whole }))
     }
 
     /// What noise is asked of `places`, one for each block, by what they found so far: it counts as the audit has it and as the eye does, relative to what light there is.
@@ -469,8 +513,13 @@ impl<'a> Blocks<'a> {
         }
     }
 
+    /// Whether a block shows a flat surface.
+    fn is_flat(&self, own: usize) -> bool {
+        self.gathers[self.blocks[own].chosen as usize] == Some(Shape::Flat)
+    }
+
     /// Adds to the `light` of all places of the blocks, the field, what lies between what chosen ones `found` beyond theirs, on the same surface in these
-    /// and in those around; never more or less is left than these found: where the field is steep it knows no better.
+    /// and in those around.
     fn add(&self, found: &[Bands], field: &[Bands], light: &mut [Bands]) {
         let of_block = |(number, block): (usize, &Block)| -> SmallVec<[(u32, Bands); 4]> {
             let of_place = |&place: &u32| {
@@ -479,7 +528,8 @@ impl<'a> Blocks<'a> {
                 for other in self.beside.0[number].iter().map(|other| *other as usize) {
                     seen.add(self.tent(place, self.blocks[other].chosen), found[other], field[other]);
                 }
-                (place, seen.with(light[place as usize]))
+                let field = light[place as usize];
+                (place, if self.is_flat(number) { seen.within(field) } else { seen.over(field) })
             };
             block.places.iter().map(of_place).collect()
         };
@@ -498,12 +548,12 @@ impl<'a> Blocks<'a> {
 
 impl Block {
     /// Blocks of some places of the picture.
-    fn all(view: &ViewRays, places: impl Iterator<Item = u32>, side: u32) -> Vec<Block> {
+    fn all(view: &ViewRays, gathers: &[Option<Shape>], places: impl Iterator<Item = u32>, side: u32) -> Vec<Block> {
         let mut blocks: Vec<Block> = Vec::new();
         let mut at: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
         for place in places {
             let of = at.entry(pixel(view, place).map(|k| k / side)).or_default();
-            let is_own = |number: &u32| lies_on(seen(view, blocks[*number as usize].places[0]), seen(view, place));
+            let is_own = |number: &u32| goes_on(view, gathers, blocks[*number as usize].places[0], place);
             match of.iter().copied().find(is_own) {
                 Some(number) => blocks[number as usize].places.push(place),
                 None => {
@@ -539,7 +589,66 @@ fn cost(solution: &Solution, places: &[Place], monitor: &dyn Monitor) -> Result<
 mod tests {
     use super::*;
     use crate::{BakeOptions, Mesh, SolveOptions, Tracer, bake, cornell_box};
+    use glam::{DVec3, Quat, Vec3};
+    use radiosity_scene::Scene;
     use radiosity_trace::sampling::{hash, unit};
+    use std::f32::consts::TAU;
+
+    /// The Cornell box, with a pillar beside its blocks that is round by the normals of its corners.
+    fn with_pillar(radius: f64) -> Scene {
+        let mut scene = cornell_box();
+        let middle = DVec3::new(0.42, 0.0, 0.12);
+        let outwards = |i: usize| DVec3::from(Quat::from_rotation_y(-TAU * i as f32 / 12.0) * Vec3::X);
+        let at = |i: usize, y: f64| middle + radius * outwards(i) + DVec3::new(0.0, y, 0.0);
+        for i in 0..12 {
+            let first = scene.positions.len();
+            scene.add_quad("pillar", 0, [at(i, 0.0), at(i, 0.4), at(i + 1, 0.4), at(i + 1, 0.0)]);
+            let normal = |corner: usize| (scene.positions[corner] - middle).with_y(0.0).normalize().as_vec3();
+            let normals: Vec<Vec3> = (first..scene.positions.len()).map(normal).collect();
+            scene.normals.splice(first.., normals);
+        }
+        scene
+    }
+
+    /// Pillars, as wide as some pixels and as many, that are round by their normals are nearer to what many rays gather at their pixels than the field of
+    /// elements is, and smooth from one pixel to the next.
+    #[test]
+    fn curved_surfaces_gather_too() {
+        for radius in [0.012, 0.06] {
+            let scene = with_pillar(radius);
+            let mesh = Mesh::new(&scene);
+            let tracer = Tracer::new(&scene, &mesh);
+            let baked = bake(&tracer, &coarse(SolveOptions::default().memory), &()).unwrap();
+            let view = ViewRays::new(&tracer, &scene.cameras[0], 96, 96);
+            let stations = stations(&view);
+            let (light, _) = indirect(&baked, &view, &stations, &()).unwrap();
+            let is_curved = |i: &usize| !is_flat(&baked.solution, &stations[*i]);
+            let curved: Vec<usize> = (0..stations.len()).filter(is_curved).collect();
+            let places: Vec<Place> = curved.iter().map(|i| stations[*i].place).collect();
+            let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
+            let off = |light: &dyn Fn(&Station, usize) -> Bands| {
+                let squares = curved.iter().zip(&truth).map(|(i, truth)| {
+                    let light = luminance(light(&stations[*i], *i));
+                    (light / luminance(mean(truth.light)) - 1.0).powi(2)
+                });
+                (squares.sum::<f32>() / curved.len() as f32).sqrt()
+            };
+            let gathered = off(&|_, i| light[i]);
+            let field = off(&|s, _| baked.field.at(s.place.triangle as usize, s.uv, s.side));
+            let at: HashMap<[u32; 2], f32> =
+                curved.iter().map(|i| (pixel(&view, *i as u32), luminance(light[*i]))).collect();
+            let rough = at.iter().filter_map(|([x, y], light)| {
+                let beside = 0.5 * (at.get(&[*x, y - 1])? + at.get(&[*x, y + 1])?);
+                Some((light / beside - 1.0).powi(2))
+            });
+            let rough: Vec<f32> = rough.collect();
+            let rough = (rough.iter().sum::<f32>() / rough.len() as f32).sqrt();
+            assert!(
+                gathered < 0.11 && gathered < 0.3 * field && rough < 0.05,
+                "{gathered} instead of {field}, rough {rough}"
+            );
+        }
+    }
 
     /// What a camera sees of the Cornell box, whose elements are as wide as a quarter of its walls, is nearer to what many rays gather than the field of
     /// these elements, and about half as far off.
@@ -599,7 +708,11 @@ mod tests {
             let light: Vec<Bands> = (0..).zip(&blocks.blocks).map(|(i, block)| [level(i, block.square); 3]).collect();
             let noise = vec![noise; light.len()];
             let halves = light.iter().map(|e| [*e; 2]).collect();
-            blocks.closer(&solution, &stations(&view), &Gathered { light, halves, noise, is_whole: true })
+            blocks.closer(
+                &solution,
+                &stations(&view),
+                &Gathered { light, apart: Vec::new(), halves, noise, is_whole: true },
+            )
         };
         // Far more than the direct light there.
         let step = |by: f32| move |_, [x, _]: [u32; 2]| if x < 16 { 1e6 } else { 1e6 * (1.0 + by) };
@@ -622,7 +735,7 @@ mod tests {
         let is_rim = |finding: &Finding| {
             let seen = view.seen.iter().position(|seen| seen.place.point == finding.point).unwrap();
             let x = pixel(&view, seen as u32)[0] / 2;
-            !own.gathers[seen] && (16 - 5 * AROUND..16 + 5 * AROUND).contains(&x)
+            own.gathers[seen].is_none() && (16 - 5 * AROUND..16 + 5 * AROUND).contains(&x)
         };
         assert!(rim.len() > 100 && rim.iter().all(is_rim), "{}", rim.len());
 
@@ -664,7 +777,7 @@ mod tests {
         let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
         blocks.beside.unless_sure(&mut gathered, &field);
         blocks.add(&gathered.light, &field, &mut between);
-        assert!((0..light.len()).all(|i| closer.gathers[i] || light[i] == between[i]));
+        assert!((0..light.len()).all(|i| closer.gathers[i].is_some() || light[i] == between[i]));
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();
         let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
         let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
