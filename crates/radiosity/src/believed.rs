@@ -6,10 +6,10 @@ use radiosity_scene::{Bands, luminance};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// How often the noise of blocks is evened out with that of those around.
+/// How often the noise of blocks, and the size of details, is evened out with that of those around.
 const FARTHER: usize = 4;
 
-/// How often what the field misses is evened out, so that it is told from noise where it is as wide as an element, as 25 blocks do not tell it. With once the
+/// How often what the field misses is evened out, which is also how many widths of detail there are, so that it is told from noise where it is as wide as an element, as 25 blocks do not tell it. With once the
 /// furnished room is 0.77 instead of 0.70 % off (with 4 for [`SURE`]).
 const SCALES: u32 = 4;
 
@@ -17,10 +17,11 @@ const SCALES: u32 = 4;
 /// furnished room is 0.71 % off, with 3 0.68, with 2 0.65, and with 2 there are more light dots on smooth walls, of up to 6 %.
 const SURE: f32 = 3.0;
 
-/// Mean square noise, so many times, is what of the mean square of a difference is not believed where blocks share with no others. With 1 and 4 pillars are up to a twentieth farther off.
-const CLEAR: f32 = 2.0;
+/// What is left of a detail of curved surfaces, of which few share: all but this many times the mean square noise, over its mean square. With 1 and 4 pillars are up to a twentieth farther off.
+const DOUBTED: f32 = 2.0;
 
-/// And halves that differ by more mean squares than this met a bright path that others around did not, and say nothing: within little time they are dots. With 6 and 16 all is as near.
+/// Where halves differ by more than this many times the mean square noise around, a block met a bright path that others did not, and says nothing of that detail: within little time such are dots. With 6 and 16 balls and
+/// vases are as near.
 const STRAY: f32 = 9.0;
 
 /// Of blocks, those of the same surface around each.
@@ -32,7 +33,7 @@ impl Neighbours {
         self.means(|own| [values[own]]).into_iter().map(|[mean]| mean).collect()
     }
 
-    /// The same, of several values of each.
+    /// The same, of several values of each, which are asked for by each of those around.
     fn means<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> Vec<[f32; N]> {
         let mean = |(own, beside): (usize, &SmallVec<[u32; 24]>)| -> [f32; N] {
             let mut sum = of(own);
@@ -57,7 +58,7 @@ impl Neighbours {
         let halves = &gathered.halves;
         let mut off: Vec<f32> = halves.iter().map(|halves| mean(*halves)).zip(field).map(beyond).collect();
         // Half of what halves differ by has the noise of their mean, however many blocks it is evened out over. One that met a bright path tells of it alone.
-        let mut apart: Vec<f32> = halves.iter().map(|[a, b]| 0.5 * (luminance(*a) - luminance(*b))).collect();
+        let mut apart: Vec<f32> = halves.iter().map(|halves| apart(*halves)).collect();
         let mut squares: Vec<f32> = apart.iter().map(|apart| apart * apart).collect();
         for scale in 1..=SCALES {
             (off, apart, squares) = (self.around(&off), self.around(&apart), self.around(&squares));
@@ -71,37 +72,54 @@ impl Neighbours {
         self.mix(&mut gathered.light, field, &most_sure);
     }
 
-    /// What of `gathered` light stands out on curved surfaces, where few share, over the `field`: of what each is off from those around, and these are from those farther around, so
-    /// much as stands out from noise there. All of it counts relative to the light around, as some that is dark is seen beside what is bright.
-    pub fn by_scales(&self, gathered: &Gathered, field: &[Bands]) -> Vec<Bands> {
-        let Gathered { light, apart, .. } = gathered;
-        let level = self.means(|own| [luminance(light[own]).max(f32::MIN_POSITIVE)]);
-        let off = |own: usize| {
-            let [level] = level[own];
-            let [red, green, blue]: Bands = std::array::from_fn(|k| (light[own][k] - field[own][k]) / level);
-            [red, green, blue, apart[own] / level]
+    /// Those of some blocks that are beside no others.
+    pub fn among(&self, some: &[usize]) -> Neighbours {
+        let mut number = vec![0; self.0.len()];
+        (0..).zip(some).for_each(|(new, old)| number[*old] = new);
+        let renumbered = |old: &usize| self.0[*old].iter().map(|other| number[*other as usize]).collect();
+        Neighbours(some.iter().map(renumbered).collect())
+    }
+
+    /// What of `light` stands out over the `field`, if there is one, where few places share: what they differ by, relative to the light around, is split into details of
+    /// [`SCALES`] + 1 widths (à trous; Starck and Murtagh 1994), and each is kept as far as in a wide surrounding it is larger than its noise (a Wiener filter), which the halves of the rays, so far `apart` from the light, tell.
+    pub fn by_scales(&self, light: &[Bands], apart: &[f32], field: Option<&[Bands]>) -> Vec<Bands> {
+        let below = |own: usize| field.map_or([0.0; 3], |field| field[own]);
+        let level = |own: usize| luminance(light[own]).max(luminance(below(own)));
+        let level = self.means(|own| [if level(own).is_finite() { level(own) } else { 0.0 }]);
+        let level = |own: usize| level[own][0].max(f32::MIN_POSITIVE);
+        let beyond = |own: usize| {
+            let [red, green, blue]: Bands = std::array::from_fn(|k| (light[own][k] - below(own)[k]) / level(own));
+            let all = [red, green, blue, apart[own] / level(own)];
+            if all.iter().all(|k| k.is_finite()) { all } else { [0.0; 4] }
         };
-        // Beyond the field, per band; and half of what halves differ by.
-        let mut off: Vec<[f32; 4]> = (0..field.len()).map(off).collect();
-        let mut beyond = vec![[0.0; 3]; field.len()];
+        let mut left: Vec<[f32; 4]> = (0..light.len()).into_par_iter().map(beyond).collect();
+        let mut kept = vec![[0.0; 3]; light.len()];
         for scale in 0..=SCALES {
-            let wide = if scale < SCALES { self.means(|own| off[own]) } else { vec![[0.0; 4]; off.len()] };
-            let detail = |own: usize| -> [f32; 4] { std::array::from_fn(|k| off[own][k] - wide[own][k]) };
-            let squares = self.means(|own| {
-                let [red, green, blue, apart] = detail(own);
+            let is_last = scale == SCALES;
+            let wide = if is_last { vec![[0.0; 4]; left.len()] } else { self.means(|own| left[own]) };
+            let detail = |(left, wide): (&[f32; 4], &[f32; 4])| std::array::from_fn(|k| left[k] - wide[k]);
+            let details: Vec<[f32; 4]> = left.par_iter().zip(&wide).map(detail).collect();
+            let square = |own: usize| {
+                let [red, green, blue, apart] = details[own];
                 [luminance([red, green, blue]).powi(2), apart.powi(2)]
-            });
-            let squares = (1..FARTHER).fold(squares, |squares, _| self.means(|own| squares[own]));
-            beyond.par_iter_mut().enumerate().for_each(|(own, beyond): (usize, &mut Bands)| {
-                let [all, noise] = squares[own];
-                let has_strayed = detail(own)[3].powi(2) > STRAY * noise;
-                let sure = if all > 0.0 && !has_strayed { (1.0 - CLEAR * noise / all).max(0.0) } else { 0.0 };
-                *beyond = std::array::from_fn(|k| beyond[k] + sure * detail(own)[k]);
-            });
-            off = wide;
+            };
+            let squares = (0..light.len()).map(square).collect();
+            let squares = (0..FARTHER).fold(squares, |squares: Vec<[f32; 2]>, _| self.means(|own| squares[own]));
+            for ((kept, squares), detail) in kept.iter_mut().zip(squares).zip(details) {
+                let [all, noise] = squares;
+                let [.., apart] = detail;
+                let part = match all > 0.0 && apart * apart <= STRAY * noise {
+                    // Below what is widest there is nothing else.
+                    _ if is_last && field.is_none() => 1.0,
+                    true => (1.0 - DOUBTED * noise / all).max(0.0),
+                    false => 0.0,
+                };
+                *kept = std::array::from_fn(|k| kept[k] + part * detail[k]);
+            }
+            left = wide;
         }
-        let believed = |own: usize| std::array::from_fn(|k| (field[own][k] + level[own][0] * beyond[own][k]).max(0.0));
-        (0..field.len()).map(believed).collect()
+        let shown = |own: usize| std::array::from_fn(|k| (below(own)[k] + level(own) * kept[own][k]).max(0.0));
+        (0..light.len()).map(shown).collect()
     }
 
     /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than their `noise` might ([`SURE`]): they would
@@ -126,6 +144,11 @@ impl Neighbours {
         let squares = noise.iter().map(|noise| noise * noise).collect();
         (0..FARTHER).fold(squares, |squares: Vec<f32>, _| self.around(&squares)).into_iter().map(f32::sqrt).collect()
     }
+}
+
+/// How far the first half is from the mean of both, in luminance: its size is the noise of that, and its sign is evened out as noise is.
+pub(crate) fn apart([a, b]: [Bands; 2]) -> f32 {
+    0.5 * (luminance(a) - luminance(b))
 }
 
 /// How much of a difference is believed, by its noise (a Wiener filter, as in `radiosity_view::pool`).
@@ -214,7 +237,7 @@ mod tests {
         let left = |noise: f32, wrong: &dyn Fn(usize) -> bool| {
             let mut gathered = Gathered {
                 light: vec![[1.0; 3]; SIDE * SIDE],
-                halves: (0..SIDE * SIDE).map(apart).collect(),
+                halves: (0..SIDE * SIDE).map(two).collect(),
                 noise: vec![noise; SIDE * SIDE],
                 apart: Vec::new(),
                 is_whole: true,
@@ -239,7 +262,7 @@ mod tests {
         for (reach, most) in [(0, 0.78), (1, 0.28)] {
             let all = (0..(SIDE * SIDE) as u32).map(|i| if reach == 0 { SmallVec::new() } else { strip(i) });
             let blocks = Neighbours(all.collect());
-            let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(apart).collect();
+            let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(two).collect();
             let light: Vec<Bands> = halves.iter().map(|halves| mean(*halves)).collect();
             let noise = halves.iter().map(|halves| halved(*halves)).collect();
             let off = |light: &[Bands]| light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>().sqrt();
@@ -251,38 +274,68 @@ mod tests {
         }
     }
 
-    /// Of what blocks found that share with none, noise is left out where the field is right and where it is wrong all over; what is finer than that, and more than noise, stays.
+    /// Of what blocks found that share with none, noise is left out where the field is right and where it is wrong all over, in light and in the dark; what is finer than that, and more than noise, stays.
     #[test]
     fn by_scales_details_stay_and_noise_does_not() {
         let blocks = Neighbours((0..SIDE * SIDE).map(beside).collect());
-        let left = |wrong: f32, detail: f32| {
-            let truth = |i: usize| 1.0 + if i % 4 < 2 { detail } else { -detail };
-            let all: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(apart).collect();
-            let light: Vec<Bands> = (0..all.len()).map(|i| [mean(all[i])[0] - 1.0 + truth(i); 3]).collect();
-            let halves = all.iter().map(|[a, b]| 0.5 * (a[0] - b[0])).collect();
-            let gathered = Gathered { light, halves: all, noise: Vec::new(), apart: halves, is_whole: true };
-            let shown = blocks.by_scales(&gathered, &vec![[1.0 + wrong; 3]; SIDE * SIDE]);
-            let off =
-                |light: &[Bands]| light.iter().enumerate().map(|(i, e)| (e[0] - truth(i)).powi(2)).sum::<f32>().sqrt();
-            off(&shown) / off(&gathered.light)
+        let left = |wrong: f32, detail: f32, dark: f32| {
+            let level = |i: usize| if i % SIDE < SIDE / 2 { dark } else { 1.0 };
+            let truth = |i: usize| level(i) * (1.0 + if i % 4 < 2 { detail } else { -detail });
+            let halves = |i: usize| two(i).map(|half| half.map(|e| truth(i) + level(i) * (e - 1.0)));
+            let light: Vec<Bands> = (0..SIDE * SIDE).map(|i| mean(halves(i))).collect();
+            let noise: Vec<f32> = (0..SIDE * SIDE).map(|i| apart(halves(i))).collect();
+            let field: Vec<Bands> = (0..SIDE * SIDE).map(|i| [(1.0 + wrong) * level(i); 3]).collect();
+            let shown = blocks.by_scales(&light, &noise, Some(&field));
+            let off = |light: &[Bands]| {
+                light.iter().enumerate().map(|(i, e)| (e[0] / truth(i) - 1.0).powi(2)).sum::<f32>().sqrt()
+            };
+            off(&shown) / off(&light)
         };
-        let [right, wrong, fine] = [left(0.0, 0.0), left(0.5, 0.0), left(0.0, 1.0)];
+        let [right, wrong, fine] = [left(0.0, 0.0, 1.0), left(0.5, 0.0, 1.0), left(0.0, 0.5, 1.0)];
         assert!(right < 0.1 && wrong < 0.2 && fine < 1.05, "{right} {wrong} {fine}");
+        // Beside light, noise of the dark is told by that of the dark.
+        let dark = left(0.0, 0.0, 0.03);
+        assert!(dark < 0.09, "{dark}");
+    }
 
-        // One that met a bright path by one half has no part in details that others show.
+    /// A block that met a bright path by one half has no part in details that others show.
+    #[test]
+    fn by_scales_bright_paths_of_one_half_do_not_show() {
+        let blocks = Neighbours((0..SIDE * SIDE).map(beside).collect());
         let detail = |i: usize| [if i % 4 < 2 { 1.3 } else { 0.7 }; 3];
         let mut light: Vec<Bands> = (0..SIDE * SIDE).map(detail).collect();
         let mut apart = vec![1e-3; SIDE * SIDE];
         let own = SIDE * SIDE / 2 + SIDE / 2;
         (light[own], apart[own]) = ([3.0; 3], 1.5);
-        let gathered = Gathered { light, halves: Vec::new(), noise: Vec::new(), apart, is_whole: true };
-        let shown = blocks.by_scales(&gathered, &vec![[1.0; 3]; SIDE * SIDE]);
+        let shown = blocks.by_scales(&light, &apart, Some(&vec![[1.0; 3]; SIDE * SIDE]));
         let (lit, other) = (shown[own][0], shown[SIDE / 2][0]);
         assert!(lit < 1.5 && (other - 1.3).abs() < 0.05, "{lit}, {other} far away");
     }
 
+    /// Without a field no light is lost, however noisy; and what is lit stays so beside what found nothing where the field has some, or more than there are numbers for.
+    #[test]
+    fn by_scales_light_stays() {
+        let alone = Neighbours(vec![SmallVec::new(); SIDE * SIDE]);
+        let light: Vec<Bands> = (0..SIDE * SIDE).map(|i| mean(two(i))).collect();
+        let noise: Vec<f32> = (0..SIDE * SIDE).map(|i| apart(two(i))).collect();
+        for (shown, found) in alone.by_scales(&light, &noise, None).iter().zip(&light) {
+            assert!((shown[0] - found[0]).abs() < 1e-6, "{} of {}", shown[0], found[0]);
+        }
+
+        let blocks = Neighbours((0..SIDE * SIDE).map(beside).collect());
+        for dark in [0.0, f32::INFINITY] {
+            let half = |i: usize, left: f32, right: f32| [if i % SIDE < SIDE / 2 { left } else { right }; 3];
+            let light: Vec<Bands> = (0..SIDE * SIDE).map(|i| half(i, dark, 1.0)).collect();
+            let field: Vec<Bands> = (0..SIDE * SIDE).map(|i| half(i, 0.5, 1.0)).collect();
+            let shown = blocks.by_scales(&light, &vec![0.0; SIDE * SIDE], Some(&field));
+            let lit = (0..SIDE * SIDE).filter(|i| i % SIDE >= SIDE / 2).map(|i| shown[i][0]);
+            let least = lit.fold(f32::INFINITY, f32::min);
+            assert!(least > 0.9, "{least} beside {dark}");
+        }
+    }
+
     /// Two halves around 1.
-    fn apart(i: usize) -> [Bands; 2] {
+    fn two(i: usize) -> [Bands; 2] {
         [0, 1].map(|k| [0.5 + unit(hash(hash(i as u32) ^ k)); 3])
     }
 }

@@ -13,7 +13,7 @@ use radiosity_view::picture::shading_normal;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Elements are flat where normals differ from theirs by less than this cosine, that of half a degree: light that comes from
+/// Elements, and triangles that pictures show, are flat where normals differ from theirs by less than this cosine, that of half a degree: light that comes from
 /// one side changes by less than one percent.
 pub(crate) const FLAT: f64 = 0.99996;
 

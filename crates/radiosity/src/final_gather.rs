@@ -4,14 +4,14 @@
 //!
 //! One place in a block of a few pixels gathers for each surface that the block shows; those of a plane share what they found ([`Planes`]), and the
 //! noisy ones send more rays ([`crate::allocation`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers, shares with what blocks around found, and shows
-//! what differs from what lies between these by more than noise. Places of curved surfaces, with normals of their own, share with no others, and would be as grainy as each is noisy: of them is shown what stands out from
-//! noise by itself or together with those around, and of what lies between them only what these found beyond the field, as light that changes with the normal need not be within it.
+//! what differs from what lies between these by more than noise. Places of curved surfaces share on their facets alone, and would be grainy: of them is shown what stands out from
+//! noise by scales. Light changes with the normal there: between them lies what they found beyond the field, whether or not that is within what they found.
 //!
-//! Places do not share over walls, but blocks know none: beside a wall that is narrower than a block, light of one side may show on the other, for its pixels.
+//! Places do not share over walls, but blocks know none: beside a wall that is narrower than a block, light of one side may show on the other, for its pixels. Nor do curved ones know how far behind each other parts of one object are.
 
-use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, halved, mean};
+use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, mean};
 use crate::answer::Station;
-use crate::believed::Neighbours;
+use crate::believed::{Neighbours, apart};
 use crate::field::FLAT;
 use crate::pace::{self, Cost};
 use crate::pixels::{DARK, lies_on, pixel, seen};
@@ -114,7 +114,7 @@ pub(crate) struct Gathered {
     pub halves: Vec<[Bands; 2]>,
     /// Standard errors of the light, lx.
     pub noise: Vec<f32>,
-    /// Half of what halves differ by in it, lx.
+    /// How far halves are [`apart`] in it, lx.
     pub apart: Vec<f32>,
     /// Whether there was time for all rays.
     pub is_whole: bool,
@@ -173,11 +173,11 @@ impl Between {
     }
 }
 
-/// What a place gathers with, and shares by.
+/// Whether a triangle receives with its own normal all over, or with those of its corners, as part of an object that is round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     Flat,
-    Curved,
+    Curved { object: u32 },
 }
 
 /// What of a picture gathers, and the rest.
@@ -188,7 +188,7 @@ struct Blocks<'a> {
     blocks: Vec<Block>,
     /// Those in the squares around.
     beside: Neighbours,
-    /// Places that gather, by number.
+    /// Shapes of the places that gather, by number.
     gathers: Vec<Option<Shape>>,
 }
 
@@ -205,8 +205,9 @@ pub(crate) fn indirect(
 ) -> Result<(Vec<Bands>, bool), Error> {
     let solution = &baked.solution;
     let mut blocks = Blocks::new(solution, view, stations, 1);
-    // Within a time limit the field has half of the time where it is shown.
-    let part = if solution.options.looked_up { 1.0 } else { 0.5 };
+    // Within a time limit the field has its part of the time: by what it alone shows, or half where it is shown everywhere.
+    let alone = blocks.gathers.iter().filter(|gathers| gathers.is_none()).count() as f64 / stations.len().max(1) as f64;
+    let part = if solution.options.looked_up { 1.0 - alone } else { 0.5 };
     let own = match pace::left(monitor) {
         Some(left) => Timed::new(monitor, Duration::from_secs_f64(part * left)),
         None => Timed::unlimited(monitor),
@@ -255,13 +256,15 @@ pub(crate) fn indirect(
     };
     if let Some(mut gathered) = gathered {
         let field = chosen(&blocks, &light);
-        let curved = blocks.beside.by_scales(&gathered, &field);
+        let curved: Vec<usize> = (0..field.len()).filter(|own| !blocks.is_flat(*own)).collect();
+        let of_curved = |of: &[Bands]| -> Vec<Bands> { curved.iter().map(|own| of[*own]).collect() };
+        let noise: Vec<f32> = curved.iter().map(|own| gathered.apart[*own]).collect();
+        let below = (!solution.options.looked_up).then(|| of_curved(&field));
+        let shown = blocks.beside.among(&curved).by_scales(&of_curved(&gathered.light), &noise, below.as_deref());
         if !solution.options.looked_up {
             blocks.beside.unless_sure(&mut gathered, &field);
         }
-        for own in (0..field.len()).filter(|own| !blocks.is_flat(*own)) {
-            gathered.light[own] = curved[own];
-        }
+        curved.iter().zip(shown).for_each(|(own, shown)| gathered.light[*own] = shown);
         blocks.add(&gathered.light, &field, &mut light);
     }
     if let Some((closer, Gathered { light: mut found, noise, .. })) = closer.zip(closely) {
@@ -279,20 +282,20 @@ fn goes_on(view: &ViewRays, gathers: &[Option<Shape>], a: u32, b: u32) -> bool {
     let (a, b) = (seen(view, a), seen(view, b));
     shape == other
         && match shape {
-            Some(Shape::Curved) => {
+            Some(Shape::Curved { .. }) => {
                 let between = b.place.point - a.place.point;
                 let risen = between.dot(a.place.normal).abs().max(between.dot(b.place.normal).abs());
                 a.behind == b.behind && a.place.normal.dot(b.place.normal) > TURNED && risen <= RISEN * between.length()
             }
-            _ => lies_on(a, b),
+            Some(Shape::Flat) => lies_on(a, b),
+            None => false,
         }
 }
 
 /// What two halves of the rays of a place found.
 fn finding(Station { place, side, .. }: &Station, halves: [Bands; 2]) -> Finding {
     let (point, triangle) = (place.point, place.triangle as usize);
-    let noise = halved(halves).copysign(luminance(halves[0]) - luminance(halves[1]));
-    Finding { point, triangle, side: *side, light: mean(halves), noise, weight: 1.0 }
+    Finding { point, triangle, side: *side, light: mean(halves), noise: apart(halves), weight: 1.0 }
 }
 
 /// Whether the triangle of a station receives with its own normal all over.
@@ -305,7 +308,14 @@ fn is_flat(solution: &Solution, Station { place, side, .. }: &Station) -> bool {
 
 impl<'a> Blocks<'a> {
     fn new(solution: &Solution, view: &'a ViewRays, stations: &[Station], wider: u32) -> Blocks<'a> {
-        let shape = |station: &Station| if is_flat(solution, station) { Shape::Flat } else { Shape::Curved };
+        let tracer = solution.tracer();
+        let object = |station: &Station| {
+            tracer.scene.triangle_object[tracer.mesh.source[station.place.triangle as usize] as usize]
+        };
+        let shape = |station: &Station| match is_flat(solution, station) {
+            true => Shape::Flat,
+            false => Shape::Curved { object: object(station) },
+        };
         let gathers = |station: &Station| solution.options.form_factors.is_none().then(|| shape(station));
         let gathers: Vec<Option<Shape>> = stations.par_iter().map(gathers).collect();
         let count = gathers.iter().flatten().count() as f64;
@@ -428,10 +438,15 @@ impl<'a> Blocks<'a> {
 
         let planes = Planes::new(solution.tracer().mesh, &solution.elements);
         let share = |halves: &[[Bands; 2]]| -> Vec<Pooled> {
-            let own = at.iter().zip(halves).map(|(station, halves)| finding(station, *halves));
-            let mut pooled = planes.pooled(&own.chain(rim.iter().copied()).collect::<Vec<_>>());
-            pooled.truncate(at.len());
-            pooled
+            // Those of one plane that receive with other normals are not alike.
+            let (flat, curved): (Vec<usize>, Vec<usize>) = (0..at.len()).partition(|own| self.is_flat(*own));
+            let mut shared = vec![Pooled::alone([0.0; 3], 0.0); at.len()];
+            for (own, rim) in [(flat, rim), (curved, &[])] {
+                let findings = own.iter().map(|i| finding(&at[*i], halves[*i])).chain(rim.iter().copied());
+                let pooled = planes.pooled(&findings.collect::<Vec<_>>());
+                own.into_iter().zip(pooled).for_each(|(own, pooled)| shared[own] = pooled);
+            }
+            shared
         };
         let (seconds, halves) = pace::timed(|| solution.halves_at(&places, first, 0, monitor));
         let each = seconds / first as f64;
@@ -622,24 +637,27 @@ mod tests {
             let view = ViewRays::new(&tracer, &scene.cameras[0], 96, 96);
             let stations = stations(&view);
             let (light, _) = indirect(&baked, &view, &stations, &()).unwrap();
+            let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+            assert!(one.install(|| indirect(&baked, &view, &stations, &())).unwrap().0 == light);
             let is_curved = |i: &usize| !is_flat(&baked.solution, &stations[*i]);
             let curved: Vec<usize> = (0..stations.len()).filter(is_curved).collect();
             let places: Vec<Place> = curved.iter().map(|i| stations[*i].place).collect();
             let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
-            let off = |light: &dyn Fn(&Station, usize) -> Bands| {
+            let off = |light: &dyn Fn(usize) -> Bands| {
                 let squares = curved.iter().zip(&truth).map(|(i, truth)| {
-                    let light = luminance(light(&stations[*i], *i));
+                    let light = luminance(light(*i));
                     (light / luminance(mean(truth.light)) - 1.0).powi(2)
                 });
                 (squares.sum::<f32>() / curved.len() as f32).sqrt()
             };
-            let gathered = off(&|_, i| light[i]);
-            let field = off(&|s, _| baked.field.at(s.place.triangle as usize, s.uv, s.side));
+            let gathered = off(&|i| light[i]);
+            let field = off(&|i| baked.field.at(stations[i].place.triangle as usize, stations[i].uv, stations[i].side));
             let at: HashMap<[u32; 2], f32> =
                 curved.iter().map(|i| (pixel(&view, *i as u32), luminance(light[*i]))).collect();
-            let rough = at.iter().filter_map(|([x, y], light)| {
-                let beside = 0.5 * (at.get(&[*x, y - 1])? + at.get(&[*x, y + 1])?);
-                Some((light / beside - 1.0).powi(2))
+            let rough = curved.iter().filter_map(|i| {
+                let [x, y] = pixel(&view, *i as u32);
+                let beside = 0.5 * (at.get(&[x, y.checked_sub(1)?])? + at.get(&[x, y + 1])?);
+                Some((at[&[x, y]] / beside - 1.0).powi(2))
             });
             let rough: Vec<f32> = rough.collect();
             let rough = (rough.iter().sum::<f32>() / rough.len() as f32).sqrt();
@@ -711,7 +729,7 @@ mod tests {
             blocks.closer(
                 &solution,
                 &stations(&view),
-                &Gathered { light, apart: Vec::new(), halves, noise, is_whole: true },
+                &Gathered { light, apart: noise.clone(), halves, noise, is_whole: true },
             )
         };
         // Far more than the direct light there.
