@@ -6,36 +6,22 @@
 //! noisy ones send more rays ([`crate::allocation`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers, shares with what blocks around found, and shows
 //! what differs from what lies between these by more than noise. Places of curved surfaces share on their facets alone, and would be grainy: of them is shown what stands out from
 //! noise by scales. Light changes with the normal there: between them lies what they found beyond the field, whether or not that is within what they found.
-//!
-//! Places do not share over walls, but blocks know none: beside a wall that is narrower than a block, light of one side may show on the other, for its pixels. Nor do curved ones know how far behind each other parts of one object are.
 
 use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, mean};
 use crate::answer::Station;
-use crate::believed::{Neighbours, apart};
-use crate::field::FLAT;
+use crate::believed::apart;
+use crate::blocks::{Blocks, Shape};
 use crate::pace::{self, Cost};
-use crate::pixels::{DARK, lies_on, pixel, seen};
+use crate::pixels::{DARK, seen};
 use crate::points::evened;
 use crate::{Baked, Error, Monitor, Solution, Timed};
-use radiosity_scene::{Bands, Side, luminance};
+use radiosity_scene::{Bands, luminance};
 use radiosity_trace::Place;
-use radiosity_view::picture::{ViewRays, shading_normal};
+use radiosity_view::picture::ViewRays;
 use radiosity_view::{Finding, Planes, Pooled};
 use rayon::prelude::*;
-use smallvec::SmallVec;
-use std::cmp::Reverse;
-use std::collections::HashMap;
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::time::Duration;
-
-/// Places that gather for a picture where each block of pixels shows one surface: of larger pictures blocks are wider. And how many times as many gather at
-/// most, where blocks show several: of a furnished office at 900 × 600 159,514 in 135,000 blocks.
-const PLACES: f64 = 400_000.0;
-const SURFACES: usize = 2;
-
-/// The least of them, and bytes that each takes, where memory is short.
-const LEAST_PLACES: f64 = 10_000.0;
-const PLACE_BYTES: usize = 2000;
 
 /// How many times as wide blocks are where time does not do for these: a sixteenth of the places, at last, takes less than the field of elements that are only
 /// looked up, which is mottled.
@@ -84,27 +70,9 @@ const CLEAR: f32 = 3.0;
 /// is unlike all others, these are steep as well; to ask that each is unlike three of them makes the bands beside shadows ragged.
 const BACKED: f32 = 0.25;
 
-/// Squares around a block, to each side, in which others of its surface are looked for.
-const AROUND: u32 = 2;
-
-/// Blocks up to so many times [`AROUND`] from steep ones share what they found with the pixels that gather there: where these end, planes through their light alone lie below it where it is bent, which left a dark
+/// Blocks up to so many times [`AROUND`](crate::blocks::AROUND) from steep ones share what they found with the pixels that gather there: where these end, planes through their light alone lie below it where it is bent, which left a dark
 /// line. With half and with twice as many nothing was tried.
 const RIM: usize = 4;
-
-/// Curved surfaces go on from one place to another where normals turn by less than this cosine, of 30 degrees, and both see the other this near to their horizon, by its sine: within blocks of a few pixels,
-/// at the limb of a ball or on a thin pole, they turn by as much. With cosines of 0.7 and 0.95 pictures are as near.
-const TURNED: f64 = 0.866;
-const RISEN: f64 = 0.5;
-
-/// Least weight of a block's own place, where its tent ends before a pixel of the block: something is always there.
-const LEAST_WEIGHT: f32 = 1e-3;
-
-/// A surface within a square of some pixels: the places that it shows there, and the one that gathers for them.
-struct Block {
-    square: [u32; 2],
-    places: SmallVec<[u32; 4]>,
-    chosen: u32,
-}
 
 /// Light by block.
 pub(crate) struct Gathered {
@@ -136,60 +104,6 @@ impl Wanted {
         let squares = noise.iter().zip(&self.weights).map(|(noise, weight)| weight * f64::from(*noise).powi(2));
         (squares.sum::<f64>() / self.weights.iter().sum::<f64>()).sqrt()
     }
-}
-
-/// What blocks around a place found.
-#[derive(Default)]
-struct Between {
-    total: f32,
-    /// Sum of what is beyond the field.
-    beyond: Bands,
-    /// Least and most of those that count.
-    range: Option<[Bands; 2]>,
-}
-
-impl Between {
-    fn add(&mut self, weight: f32, found: Bands, field: Bands) {
-        if weight > 0.0 {
-            self.total += weight;
-            self.beyond = std::array::from_fn(|k| self.beyond[k] + weight * (found[k] - field[k]));
-            let [low, high] = self.range.unwrap_or([found; 2]);
-            self.range =
-                Some([std::array::from_fn(|k| low[k].min(found[k])), std::array::from_fn(|k| high[k].max(found[k]))]);
-        }
-    }
-
-    /// Light at the place by that of the field there.
-    fn over(&self, field: Bands) -> Bands {
-        std::array::from_fn(|k| (field[k] + self.beyond[k] / self.total).max(0.0))
-    }
-
-    /// The same, never more or less than these found: where the field is steep it knows no better.
-    fn within(&self, field: Bands) -> Bands {
-        let [low, high] = self.range.unwrap_or([field; 2]);
-        let light = self.over(field);
-        // Light beyond single precision must not end in a panic.
-        std::array::from_fn(|k| light[k].max(low[k]).min(high[k]))
-    }
-}
-
-/// Whether a triangle receives with its own normal all over, or with those of its corners, as part of an object that is round.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Shape {
-    Flat,
-    Curved { object: u32 },
-}
-
-/// What of a picture gathers, and the rest.
-struct Blocks<'a> {
-    view: &'a ViewRays,
-    /// Pixels along the side of a square.
-    side: u32,
-    blocks: Vec<Block>,
-    /// Those in the squares around.
-    beside: Neighbours,
-    /// Shapes of the places that gather, by number.
-    gathers: Vec<Option<Shape>>,
 }
 
 /// Indirect light of all that is seen, and whether there was time to gather it as it should be. Of a solution by a matrix of form factors the field is
@@ -276,87 +190,13 @@ pub(crate) fn indirect(
     Ok((light, is_whole))
 }
 
-/// Whether a flat surface, or a curved one, goes on from one place of a picture to another.
-fn goes_on(view: &ViewRays, gathers: &[Option<Shape>], a: u32, b: u32) -> bool {
-    let [shape, other] = [a, b].map(|place| gathers[place as usize]);
-    let (a, b) = (seen(view, a), seen(view, b));
-    shape == other
-        && match shape {
-            Some(Shape::Curved { .. }) => {
-                let between = b.place.point - a.place.point;
-                let risen = between.dot(a.place.normal).abs().max(between.dot(b.place.normal).abs());
-                a.behind == b.behind && a.place.normal.dot(b.place.normal) > TURNED && risen <= RISEN * between.length()
-            }
-            Some(Shape::Flat) => lies_on(a, b),
-            None => false,
-        }
-}
-
 /// What two halves of the rays of a place found.
 fn finding(Station { place, side, .. }: &Station, halves: [Bands; 2]) -> Finding {
     let (point, triangle) = (place.point, place.triangle as usize);
     Finding { point, triangle, side: *side, light: mean(halves), noise: apart(halves), weight: 1.0 }
 }
 
-/// Whether the triangle of a station receives with its own normal all over.
-fn is_flat(solution: &Solution, Station { place, side, .. }: &Station) -> bool {
-    let (tracer, triangle) = (solution.tracer(), place.triangle as usize);
-    let own = tracer.mesh.normal(triangle) * if *side == Side::Front { 1.0 } else { -1.0 };
-    let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
-    corners.into_iter().all(|uv| shading_normal(tracer, triangle, uv.into(), *side).dot(own) > FLAT)
-}
-
 impl<'a> Blocks<'a> {
-    fn new(solution: &Solution, view: &'a ViewRays, stations: &[Station], wider: u32) -> Blocks<'a> {
-        let tracer = solution.tracer();
-        let object = |station: &Station| {
-            tracer.scene.triangle_object[tracer.mesh.source[station.place.triangle as usize] as usize]
-        };
-        let shape = |station: &Station| match is_flat(solution, station) {
-            true => Shape::Flat,
-            false => Shape::Curved { object: object(station) },
-        };
-        let gathers = |station: &Station| solution.options.form_factors.is_none().then(|| shape(station));
-        let gathers: Vec<Option<Shape>> = stations.par_iter().map(gathers).collect();
-        let count = gathers.iter().flatten().count() as f64;
-        let most = PLACES.min((solution.memory_allowed() / PLACE_BYTES) as f64).max(LEAST_PLACES);
-        Blocks::of(view, gathers, wider * (count / most).sqrt().ceil().max(1.0) as u32, SURFACES * most as usize)
-    }
-
-    /// Those of places that gather, of so many pixels to a side, no more than `most`.
-    fn of(view: &'a ViewRays, mut gathers: Vec<Option<Shape>>, side: u32, most: usize) -> Blocks<'a> {
-        let first = |row: u32| view.seen.partition_point(|seen| seen.pixel < row * view.width) as u32;
-        let of_row = |row: u32| {
-            let places =
-                (first(row * side)..first((row + 1) * side)).filter(|place| gathers[*place as usize].is_some());
-            Block::all(view, &gathers, places, side)
-        };
-        let rows: Vec<Vec<Block>> = (0..view.height.div_ceil(side)).into_par_iter().map(of_row).collect();
-        let mut blocks: Vec<Block> = rows.into_iter().flatten().collect();
-        // Where surfaces are as small as pixels those that show most gather, and the rest has the field.
-        if blocks.len() > most {
-            blocks.sort_by_key(|block| (Reverse(block.places.len()), block.chosen));
-            for block in blocks.drain(most..) {
-                block.places.iter().for_each(|place| gathers[*place as usize] = None);
-            }
-            blocks.sort_by_key(|block| block.chosen);
-        }
-        let mut at: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
-        for (number, block) in (0..).zip(&blocks) {
-            at.entry(block.square).or_default().push(number);
-        }
-        let beside = |(own, block): (u32, &Block)| {
-            let [x, y] = block.square;
-            let low = [x, y].map(|k| k.saturating_sub(AROUND));
-            let squares = (low[1]..=y + AROUND).flat_map(|y| (low[0]..=x + AROUND).map(move |x| [x, y]));
-            let is_beside =
-                |other: &u32| *other != own && goes_on(view, &gathers, block.chosen, blocks[*other as usize].chosen);
-            squares.filter_map(|square| at.get(&square)).flatten().copied().filter(is_beside).collect()
-        };
-        let beside = Neighbours((0..blocks.len() as u32).into_par_iter().zip(&blocks).map(beside).collect());
-        Blocks { view, side, blocks, beside, gathers }
-    }
-
     /// Blocks of a pixel where what these gathered of flat surfaces is steep, no more than there are of these, where it is steepest, and what others around them found; nothing where it is nowhere.
     fn closer(
         &self,
@@ -527,67 +367,6 @@ impl<'a> Blocks<'a> {
             weights,
         }
     }
-
-    /// Whether a block shows a flat surface.
-    fn is_flat(&self, own: usize) -> bool {
-        self.gathers[self.blocks[own].chosen as usize] == Some(Shape::Flat)
-    }
-
-    /// Adds to the `light` of all places of the blocks, the field, what lies between what chosen ones `found` beyond theirs, on the same surface in these
-    /// and in those around.
-    fn add(&self, found: &[Bands], field: &[Bands], light: &mut [Bands]) {
-        let of_block = |(number, block): (usize, &Block)| -> SmallVec<[(u32, Bands); 4]> {
-            let of_place = |&place: &u32| {
-                let mut seen = Between::default();
-                seen.add(self.tent(place, block.chosen).max(LEAST_WEIGHT), found[number], field[number]);
-                for other in self.beside.0[number].iter().map(|other| *other as usize) {
-                    seen.add(self.tent(place, self.blocks[other].chosen), found[other], field[other]);
-                }
-                let field = light[place as usize];
-                (place, if self.is_flat(number) { seen.within(field) } else { seen.over(field) })
-            };
-            block.places.iter().map(of_place).collect()
-        };
-        let all: Vec<_> = self.blocks.par_iter().enumerate().map(of_block).collect();
-        for (place, all) in all.into_iter().flatten() {
-            light[place as usize] = all;
-        }
-    }
-
-    /// What one place counts at another: 1 at its own pixel, less towards those a block's side away.
-    fn tent(&self, place: u32, chosen: u32) -> f32 {
-        let (a, b) = (pixel(self.view, place), pixel(self.view, chosen));
-        [0, 1].map(|k| (1.0 - a[k].abs_diff(b[k]) as f32 / self.side as f32).max(0.0)).into_iter().product()
-    }
-}
-
-impl Block {
-    /// Blocks of some places of the picture.
-    fn all(view: &ViewRays, gathers: &[Option<Shape>], places: impl Iterator<Item = u32>, side: u32) -> Vec<Block> {
-        let mut blocks: Vec<Block> = Vec::new();
-        let mut at: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
-        for place in places {
-            let of = at.entry(pixel(view, place).map(|k| k / side)).or_default();
-            let is_own = |number: &u32| goes_on(view, gathers, blocks[*number as usize].places[0], place);
-            match of.iter().copied().find(is_own) {
-                Some(number) => blocks[number as usize].places.push(place),
-                None => {
-                    of.push(blocks.len() as u32);
-                    let square = pixel(view, place).map(|k| k / side);
-                    blocks.push(Block { square, places: SmallVec::from_slice(&[place]), chosen: place });
-                }
-            }
-        }
-        // The one nearest to the middle: so they are as far apart everywhere.
-        for block in &mut blocks {
-            let from_middle = |place: &u32| {
-                let at = pixel(view, *place);
-                [0, 1].map(|k| (at[k] % side).abs_diff(side / 2).pow(2)).into_iter().sum::<u32>()
-            };
-            block.chosen = block.places.iter().copied().min_by_key(from_middle).unwrap_or(block.chosen);
-        }
-        blocks
-    }
 }
 
 /// What places take to gather by their rays, by a part of them.
@@ -603,10 +382,13 @@ fn cost(solution: &Solution, places: &[Place], monitor: &dyn Monitor) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blocks::{AROUND, is_flat};
+    use crate::pixels::pixel;
     use crate::{BakeOptions, Mesh, SolveOptions, Tracer, bake, cornell_box};
     use glam::{DVec3, Quat, Vec3};
     use radiosity_scene::Scene;
     use radiosity_trace::sampling::{hash, unit};
+    use std::collections::HashMap;
     use std::f32::consts::TAU;
 
     /// The Cornell box, with a pillar beside its blocks that is round by the normals of its corners.

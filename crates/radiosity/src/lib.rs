@@ -17,6 +17,7 @@ mod allocation;
 pub mod answer;
 pub mod bake;
 mod believed;
+mod blocks;
 mod canvas;
 pub mod compare;
 mod cornell;
