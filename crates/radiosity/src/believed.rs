@@ -1,23 +1,17 @@
 //! What of gathered light is believed over what is there without it: the field of elements, or what lies between wider blocks. Both are smooth, and noise is seen on smooth walls.
 
-use crate::allocation::mean;
-use crate::final_gather::Gathered;
 use radiosity_scene::{Bands, luminance};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// How often the noise of blocks, and the size of details, is evened out with that of those around.
+/// How often the size of details, and that of their noise, is evened out with those around.
 const FARTHER: usize = 4;
 
-/// How often what the field misses is evened out, which is also how many widths of detail there are, so that it is told from noise where it is as wide as an element, as 25 blocks do not tell it. With once the
-/// furnished room is 0.77 instead of 0.70 % off (with 4 for [`SURE`]).
+/// How many widths of detail there are below what is as wide as an element.
 const SCALES: u32 = 4;
 
-/// Squared ratio of what the field misses to the noise of that from which on it is believed, and of what pixels differ by from what lies between blocks. With 4 the
-/// furnished room is 0.71 % off, with 3 0.68, with 2 0.65, and with 2 there are more light dots on smooth walls, of up to 6 %.
-const SURE: f32 = 3.0;
-
-/// What is left of a detail of curved surfaces, of which few share: all but this many times the mean square noise, over its mean square. With 1 and 4 pillars are up to a twentieth farther off.
+/// What is left of a detail: all but this many times the mean square noise, over its mean square. With 1 and 4 pillars are up to a twentieth farther off, with 1.3 and 3 a furnished room is 0.68 and 0.69
+/// instead of 0.67 % off.
 const DOUBTED: f32 = 2.0;
 
 /// Where halves differ by more than this many times the mean square noise around, a block met a bright path that others did not, and says nothing of that detail: within little time such are dots. With 6 and 16 balls and
@@ -28,12 +22,7 @@ const STRAY: f32 = 9.0;
 pub(crate) struct Neighbours(pub Vec<SmallVec<[u32; 24]>>);
 
 impl Neighbours {
-    /// Means over each block and those beside it.
-    fn around(&self, values: &[f32]) -> Vec<f32> {
-        self.means(|own| [values[own]]).into_iter().map(|[mean]| mean).collect()
-    }
-
-    /// The same, of several values of each, which are asked for by each of those around.
+    /// Means over each block and those beside it, of values which are asked for by each of those around.
     fn means<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> Vec<[f32; N]> {
         let mean = |(own, beside): (usize, &SmallVec<[u32; 24]>)| -> [f32; N] {
             let mut sum = of(own);
@@ -45,45 +34,11 @@ impl Neighbours {
         self.0.par_iter().enumerate().map(mean).collect()
     }
 
-    /// Leaves in its place what the `field` of elements has, as far as what is `gathered` does not tell more than its noise: what
-    /// bright paths leave, if few rays meet them, is seen on walls, and the field is smooth. It may tell more by what a block shares with others, or by
-    /// what it and those around found, up to [`SCALES`] times as far.
-    pub fn unless_sure(&self, gathered: &mut Gathered, field: &[Bands]) {
-        let beyond = |(light, field): (Bands, &Bands)| luminance(light) - luminance(*field);
-        let shared = gathered.light.iter().copied().zip(field).map(beyond);
-        let farther = self.farther(&gathered.noise);
-        let noise = gathered.noise.iter().zip(farther).map(|(own, farther)| own.max(farther));
-        let mut most_sure: Vec<f32> = shared.zip(noise).map(sure).collect();
-
-        let halves = &gathered.halves;
-        let mut off: Vec<f32> = halves.iter().map(|halves| mean(*halves)).zip(field).map(beyond).collect();
-        // Half of what halves differ by has the noise of their mean, however many blocks it is evened out over. One that met a bright path tells of it alone.
-        let mut apart: Vec<f32> = halves.iter().map(|halves| apart(*halves)).collect();
-        let mut squares: Vec<f32> = apart.iter().map(|apart| apart * apart).collect();
-        for scale in 1..=SCALES {
-            (off, apart, squares) = (self.around(&off), self.around(&apart), self.around(&squares));
-            let farther = self.farther(&apart);
-            let noise = |own: usize| {
-                let count = scale as f32 * (self.0[own].len() + 1) as f32;
-                farther[own].max((squares[own] / count).sqrt())
-            };
-            most_sure.iter_mut().enumerate().for_each(|(own, most)| *most = most.max(sure((off[own], noise(own)))));
-        }
-        self.mix(&mut gathered.light, field, &most_sure);
-    }
-
-    /// Those of some blocks that are beside no others.
-    pub fn among(&self, some: &[usize]) -> Neighbours {
-        let mut number = vec![0; self.0.len()];
-        (0..).zip(some).for_each(|(new, old)| number[*old] = new);
-        let renumbered = |old: &usize| self.0[*old].iter().map(|other| number[*other as usize]).collect();
-        Neighbours(some.iter().map(renumbered).collect())
-    }
-
-    /// What of `light` stands out over the `field`, if there is one, where few places share: what they differ by, relative to the light around, is split into details of
+    /// What of `light` stands out over what lies `below` it, if there is anything: what they differ by, relative to the light around, is split into details of
     /// [`SCALES`] + 1 widths (à trous; Starck and Murtagh 1994), and each is kept as far as in a wide surrounding it is larger than its noise (a Wiener filter), which the halves of the rays, so far `apart` from the light, tell.
-    pub fn by_scales(&self, light: &[Bands], apart: &[f32], field: Option<&[Bands]>) -> Vec<Bands> {
-        let below = |own: usize| field.map_or([0.0; 3], |field| field[own]);
+    pub fn by_scales(&self, light: &[Bands], apart: &[f32], below: Option<&[Bands]>) -> Vec<Bands> {
+        let is_alone = below.is_none();
+        let below = |own: usize| below.map_or([0.0; 3], |below| below[own]);
         let level = |own: usize| luminance(light[own]).max(luminance(below(own)));
         let level = self.means(|own| [if level(own).is_finite() { level(own) } else { 0.0 }]);
         let level = |own: usize| level[own][0].max(f32::MIN_POSITIVE);
@@ -110,7 +65,7 @@ impl Neighbours {
                 let [.., apart] = detail;
                 let part = match all > 0.0 && apart * apart <= STRAY * noise {
                     // Below what is widest there is nothing else.
-                    _ if is_last && field.is_none() => 1.0,
+                    _ if is_last && is_alone => 1.0,
                     true => (1.0 - DOUBTED * noise / all).max(0.0),
                     false => 0.0,
                 };
@@ -121,29 +76,6 @@ impl Neighbours {
         let shown = |own: usize| std::array::from_fn(|k| (below(own)[k] + level(own) * kept[own][k]).max(0.0));
         (0..light.len()).map(shown).collect()
     }
-
-    /// Leaves in its place what lies `between` wider blocks, as far as what these `found` differs from it all around by no more than their `noise` might ([`SURE`]): they would
-    /// stand out as dots from what is beside them. The noise of blocks is in both, as the pixels that were theirs send the same rays again.
-    pub fn unless_clear(&self, found: &mut [Bands], between: &[Bands], noise: &[f32]) {
-        let off = |(found, between): (&Bands, &Bands)| (luminance(*found) - luminance(*between)).powi(2);
-        let off = self.around(&found.iter().zip(between).map(off).collect::<Vec<f32>>());
-        let noise = self.farther(noise);
-        let sure: Vec<f32> = off.into_iter().map(f32::sqrt).zip(noise).map(sure).collect();
-        self.mix(found, between, &sure);
-    }
-
-    /// Leaves of what was `found` so much as is sure, and `others` for the rest.
-    fn mix(&self, found: &mut [Bands], others: &[Bands], sure: &[f32]) {
-        for ((found, other), sure) in found.iter_mut().zip(others).zip(self.around(sure)) {
-            *found = std::array::from_fn(|k| other[k] + sure * (found[k] - other[k]));
-        }
-    }
-
-    /// Root mean square noise farther around, as there need not be a bright path in a window where there might be.
-    fn farther(&self, noise: &[f32]) -> Vec<f32> {
-        let squares = noise.iter().map(|noise| noise * noise).collect();
-        (0..FARTHER).fold(squares, |squares: Vec<f32>, _| self.around(&squares)).into_iter().map(f32::sqrt).collect()
-    }
 }
 
 /// How far the first half is from the mean of both, in luminance: its size is the noise of that, and its sign is evened out as noise is.
@@ -151,15 +83,10 @@ pub(crate) fn apart([a, b]: [Bands; 2]) -> f32 {
     0.5 * (luminance(a) - luminance(b))
 }
 
-/// How much of a difference is believed, by its noise (a Wiener filter, as in `radiosity_view::pool`).
-fn sure((off, noise): (f32, f32)) -> f32 {
-    if off != 0.0 { (1.0 - SURE * (noise / off).powi(2)).max(0.0) } else { 0.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::allocation::halved;
+    use crate::allocation::mean;
     use radiosity_trace::sampling::{hash, unit};
 
     /// Places in rows of [`SIDE`], each beside those of the 24 around that there are.
@@ -177,15 +104,15 @@ mod tests {
     #[test]
     fn pixels_show_what_is_clearly_theirs() {
         let blocks = Neighbours((0..SIDE * SIDE).map(beside).collect());
-        let draw = |i: usize| 0.2 * (unit(hash(i as u32)) - 0.5);
-        // Of this standard error.
-        let noise = vec![0.2 / 12f32.sqrt(); SIDE * SIDE];
+        let halves = |i: usize| two(i).map(|half| half.map(|e| 1.0 + 0.2 * (e - 1.0)));
+        let noise: Vec<f32> = (0..SIDE * SIDE).map(|i| apart(halves(i))).collect();
+        let size = (noise.iter().map(|noise| noise * noise).sum::<f32>() / noise.len() as f32).sqrt();
         let off = |detail: f32| {
             let truth = |i: usize| 1.0 + if i.is_multiple_of(2) { detail } else { -detail };
-            let mut found: Vec<Bands> = (0..SIDE * SIDE).map(|i| [truth(i) + draw(i); 3]).collect();
-            blocks.unless_clear(&mut found, &vec![[1.0; 3]; SIDE * SIDE], &noise);
-            let squares = found.iter().enumerate().map(|(i, e)| (e[0] - truth(i)).powi(2));
-            (squares.sum::<f32>() / found.len() as f32).sqrt() / noise[0]
+            let found: Vec<Bands> = (0..SIDE * SIDE).map(|i| mean(halves(i)).map(|e| truth(i) + e - 1.0)).collect();
+            let shown = blocks.by_scales(&found, &noise, Some(&vec![[1.0; 3]; SIDE * SIDE]));
+            let squares = shown.iter().enumerate().map(|(i, e)| (e[0] - truth(i)).powi(2));
+            (squares.sum::<f32>() / shown.len() as f32).sqrt() / size
         };
         assert!(off(0.0) < 0.1 && off(0.5) < 1.2, "{} {}", off(0.0), off(0.5));
     }
@@ -206,28 +133,20 @@ mod tests {
             [own.sum::<f32>() / blocks.0[i].len() as f32; 3]
         };
         let light: Vec<Bands> = (0..halves.len()).map(shared).collect();
-        // And told by these alone.
+        // And told apart by these alone.
         let told = |i: usize| {
-            let own = blocks.0[i].iter().map(|other| halved(halves[*other as usize]).powi(2));
-            own.sum::<f32>().sqrt() / blocks.0[i].len() as f32
+            let own = blocks.0[i].iter().map(|other| apart(halves[*other as usize]));
+            own.sum::<f32>() / blocks.0[i].len() as f32
         };
         let noise: Vec<f32> = (0..halves.len()).map(told).collect();
+        let truth = 1.0 + 0.005 * 8.0;
         let off =
-            |light: &[Bands]| (light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>() / light.len() as f32).sqrt();
-        let gathered = || Gathered {
-            light: light.clone(),
-            halves: halves.clone(),
-            noise: noise.clone(),
-            apart: Vec::new(),
-            is_whole: true,
-        };
-        let mut with_right = gathered();
-        blocks.unless_sure(&mut with_right, &vec![[1.0; 3]; halves.len()]);
-        assert!(off(&with_right.light) < 0.2 * off(&light), "{} of {}", off(&with_right.light), off(&light));
+            |light: &[Bands]| (light.iter().map(|e| (e[0] - truth).powi(2)).sum::<f32>() / light.len() as f32).sqrt();
+        let with_right = blocks.by_scales(&light, &noise, Some(&vec![[truth; 3]; halves.len()]));
+        assert!(off(&with_right) < 0.2 * off(&light), "{} of {}", off(&with_right), off(&light));
         let field = vec![[3.0; 3]; halves.len()];
-        let mut with_wrong = gathered();
-        blocks.unless_sure(&mut with_wrong, &field);
-        assert!(off(&with_wrong.light) < 0.1 * off(&field), "{} of {}", off(&with_wrong.light), off(&field));
+        let with_wrong = blocks.by_scales(&light, &noise, Some(&field));
+        assert!(off(&with_wrong) < 0.1 * off(&field), "{} of {}", off(&with_wrong), off(&field));
     }
 
     /// Where a field is wrong by less than 25 blocks tell, many more do if it is so on all of an element, and what each shares does at the end of a wall.
@@ -235,16 +154,12 @@ mod tests {
     fn the_field_gives_way_where_it_is_wrong_on_an_element_or_at_an_edge() {
         let blocks = Neighbours((0..SIDE * SIDE).map(beside).collect());
         let left = |noise: f32, wrong: &dyn Fn(usize) -> bool| {
-            let mut gathered = Gathered {
-                light: vec![[1.0; 3]; SIDE * SIDE],
-                halves: (0..SIDE * SIDE).map(two).collect(),
-                noise: vec![noise; SIDE * SIDE],
-                apart: Vec::new(),
-                is_whole: true,
-            };
+            let light = vec![[1.0; 3]; SIDE * SIDE];
+            let apart: Vec<f32> =
+                (0..SIDE * SIDE).map(|i| noise * (unit(hash(i as u32)) - 0.5) * 12f32.sqrt()).collect();
             let field: Vec<Bands> = (0..SIDE * SIDE).map(|i| [if wrong(i) { 1.07 } else { 1.0 }; 3]).collect();
-            blocks.unless_sure(&mut gathered, &field);
-            let own: Vec<f32> = (0..SIDE * SIDE).filter(|i| wrong(*i)).map(|i| gathered.light[i][0] - 1.0).collect();
+            let shown = blocks.by_scales(&light, &apart, Some(&field));
+            let own: Vec<f32> = (0..SIDE * SIDE).filter(|i| wrong(*i)).map(|i| shown[i][0] - 1.0).collect();
             own.iter().sum::<f32>() / own.len() as f32
         };
         let is_edge = |i: usize| i % SIDE < 3;
@@ -264,12 +179,10 @@ mod tests {
             let blocks = Neighbours(all.collect());
             let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(two).collect();
             let light: Vec<Bands> = halves.iter().map(|halves| mean(*halves)).collect();
-            let noise = halves.iter().map(|halves| halved(*halves)).collect();
+            let noise: Vec<f32> = halves.iter().map(|halves| apart(*halves)).collect();
             let off = |light: &[Bands]| light.iter().map(|e| (e[0] - 1.0).powi(2)).sum::<f32>().sqrt();
-            let before = off(&light);
-            let mut gathered = Gathered { light, halves, noise, apart: Vec::new(), is_whole: true };
-            blocks.unless_sure(&mut gathered, &vec![[1.0; 3]; SIDE * SIDE]);
-            let left = off(&gathered.light) / before;
+            let shown = blocks.by_scales(&light, &noise, Some(&vec![[1.0; 3]; SIDE * SIDE]));
+            let left = off(&shown) / off(&light);
             assert!(left < most, "{reach}: {left}");
         }
     }

@@ -92,12 +92,12 @@ pub(crate) struct Blocks<'a> {
     /// Those in the squares around.
     pub beside: Neighbours,
     /// Shapes of the places that gather, by number.
-    pub gathers: Vec<Option<Shape>>,
+    pub shapes: Vec<Option<Shape>>,
 }
 
 /// Whether a flat surface, or a curved one, goes on from one place of a picture to another.
-fn goes_on(view: &ViewRays, gathers: &[Option<Shape>], a: u32, b: u32) -> bool {
-    let [shape, other] = [a, b].map(|place| gathers[place as usize]);
+fn goes_on(view: &ViewRays, shapes: &[Option<Shape>], a: u32, b: u32) -> bool {
+    let [shape, other] = [a, b].map(|place| shapes[place as usize]);
     let (a, b) = (seen(view, a), seen(view, b));
     shape == other
         && match shape {
@@ -129,20 +129,19 @@ impl<'a> Blocks<'a> {
             true => Shape::Flat,
             false => Shape::Curved { object: object(station) },
         };
-        let gathers = |station: &Station| solution.options.form_factors.is_none().then(|| shape(station));
-        let gathers: Vec<Option<Shape>> = stations.par_iter().map(gathers).collect();
-        let count = gathers.iter().flatten().count() as f64;
+        let shape_of = |station: &Station| solution.options.form_factors.is_none().then(|| shape(station));
+        let shapes: Vec<Option<Shape>> = stations.par_iter().map(shape_of).collect();
+        let count = shapes.iter().flatten().count() as f64;
         let most = PLACES.min((solution.memory_allowed() / PLACE_BYTES) as f64).max(LEAST_PLACES);
-        Blocks::of(view, gathers, wider * (count / most).sqrt().ceil().max(1.0) as u32, SURFACES * most as usize)
+        Blocks::of(view, shapes, wider * (count / most).sqrt().ceil().max(1.0) as u32, SURFACES * most as usize)
     }
 
     /// Those of places that gather, of so many pixels to a side, no more than `most`.
-    pub fn of(view: &'a ViewRays, mut gathers: Vec<Option<Shape>>, side: u32, most: usize) -> Blocks<'a> {
+    pub fn of(view: &'a ViewRays, mut shapes: Vec<Option<Shape>>, side: u32, most: usize) -> Blocks<'a> {
         let first = |row: u32| view.seen.partition_point(|seen| seen.pixel < row * view.width) as u32;
         let of_row = |row: u32| {
-            let places =
-                (first(row * side)..first((row + 1) * side)).filter(|place| gathers[*place as usize].is_some());
-            Block::all(view, &gathers, places, side)
+            let places = (first(row * side)..first((row + 1) * side)).filter(|place| shapes[*place as usize].is_some());
+            Block::all(view, &shapes, places, side)
         };
         let rows: Vec<Vec<Block>> = (0..view.height.div_ceil(side)).into_par_iter().map(of_row).collect();
         let mut blocks: Vec<Block> = rows.into_iter().flatten().collect();
@@ -150,7 +149,7 @@ impl<'a> Blocks<'a> {
         if blocks.len() > most {
             blocks.sort_by_key(|block| (Reverse(block.places.len()), block.chosen));
             for block in blocks.drain(most..) {
-                block.places.iter().for_each(|place| gathers[*place as usize] = None);
+                block.places.iter().for_each(|place| shapes[*place as usize] = None);
             }
             blocks.sort_by_key(|block| block.chosen);
         }
@@ -163,16 +162,16 @@ impl<'a> Blocks<'a> {
             let low = [x, y].map(|k| k.saturating_sub(AROUND));
             let squares = (low[1]..=y + AROUND).flat_map(|y| (low[0]..=x + AROUND).map(move |x| [x, y]));
             let is_beside =
-                |other: &u32| *other != own && goes_on(view, &gathers, block.chosen, blocks[*other as usize].chosen);
+                |other: &u32| *other != own && goes_on(view, &shapes, block.chosen, blocks[*other as usize].chosen);
             squares.filter_map(|square| at.get(&square)).flatten().copied().filter(is_beside).collect()
         };
         let beside = Neighbours((0..blocks.len() as u32).into_par_iter().zip(&blocks).map(beside).collect());
-        Blocks { view, side, blocks, beside, gathers }
+        Blocks { view, side, blocks, beside, shapes }
     }
 
     /// Whether a block shows a flat surface.
     pub fn is_flat(&self, own: usize) -> bool {
-        self.gathers[self.blocks[own].chosen as usize] == Some(Shape::Flat)
+        self.shapes[self.blocks[own].chosen as usize] == Some(Shape::Flat)
     }
 
     /// Adds to the `light` of all places of the blocks, the field, what lies between what chosen ones `found` beyond theirs, on the same surface in these
@@ -205,12 +204,12 @@ impl<'a> Blocks<'a> {
 
 impl Block {
     /// Blocks of some places of the picture.
-    fn all(view: &ViewRays, gathers: &[Option<Shape>], places: impl Iterator<Item = u32>, side: u32) -> Vec<Block> {
+    fn all(view: &ViewRays, shapes: &[Option<Shape>], places: impl Iterator<Item = u32>, side: u32) -> Vec<Block> {
         let mut blocks: Vec<Block> = Vec::new();
         let mut at: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
         for place in places {
             let of = at.entry(pixel(view, place).map(|k| k / side)).or_default();
-            let is_own = |number: &u32| goes_on(view, gathers, blocks[*number as usize].places[0], place);
+            let is_own = |number: &u32| goes_on(view, shapes, blocks[*number as usize].places[0], place);
             match of.iter().copied().find(is_own) {
                 Some(number) => blocks[number as usize].places.push(place),
                 None => {

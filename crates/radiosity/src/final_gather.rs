@@ -120,7 +120,7 @@ pub(crate) fn indirect(
     let solution = &baked.solution;
     let mut blocks = Blocks::new(solution, view, stations, 1);
     // Within a time limit the field has its part of the time: by what it alone shows, or half where it is shown everywhere.
-    let alone = blocks.gathers.iter().filter(|gathers| gathers.is_none()).count() as f64 / stations.len().max(1) as f64;
+    let alone = blocks.shapes.iter().filter(|shape| shape.is_none()).count() as f64 / stations.len().max(1) as f64;
     let part = if solution.options.looked_up { 1.0 - alone } else { 0.5 };
     let own = match pace::left(monitor) {
         Some(left) => Timed::new(monitor, Duration::from_secs_f64(part * left)),
@@ -150,8 +150,7 @@ pub(crate) fn indirect(
     let closer = closer.map(|(closer, _)| closer);
     is_whole &= closer.is_none() || closely.as_ref().is_some_and(|gathered| gathered.is_whole);
     // Elements that are only looked up make no field that is worth a look.
-    let is_shown =
-        |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.gathers[place].is_some());
+    let is_shown = |place: usize| !(solution.options.looked_up && gathered.is_some() && blocks.shapes[place].is_some());
     let mut looks = vec![0; solution.elements.cells()];
     for Station { place, uv, side } in (0..stations.len()).filter(|place| is_shown(*place)).map(|i| stations[i]) {
         if let Some(element) = solution.elements.at(place.triangle, uv.x as f32, uv.y as f32, side) {
@@ -170,19 +169,12 @@ pub(crate) fn indirect(
     };
     if let Some(mut gathered) = gathered {
         let field = chosen(&blocks, &light);
-        let curved: Vec<usize> = (0..field.len()).filter(|own| !blocks.is_flat(*own)).collect();
-        let of_curved = |of: &[Bands]| -> Vec<Bands> { curved.iter().map(|own| of[*own]).collect() };
-        let noise: Vec<f32> = curved.iter().map(|own| gathered.apart[*own]).collect();
-        let below = (!solution.options.looked_up).then(|| of_curved(&field));
-        let shown = blocks.beside.among(&curved).by_scales(&of_curved(&gathered.light), &noise, below.as_deref());
-        if !solution.options.looked_up {
-            blocks.beside.unless_sure(&mut gathered, &field);
-        }
-        curved.iter().zip(shown).for_each(|(own, shown)| gathered.light[*own] = shown);
+        let below = (!solution.options.looked_up).then_some(&field[..]);
+        gathered.light = blocks.beside.by_scales(&gathered.light, &gathered.apart, below);
         blocks.add(&gathered.light, &field, &mut light);
     }
-    if let Some((closer, Gathered { light: mut found, noise, .. })) = closer.zip(closely) {
-        closer.beside.unless_clear(&mut found, &chosen(&closer, &light), &noise);
+    if let Some((closer, Gathered { light: found, apart, .. })) = closer.zip(closely) {
+        let found = closer.beside.by_scales(&found, &apart, Some(&chosen(&closer, &light)));
         for (block, found) in closer.blocks.iter().zip(found) {
             block.places.iter().for_each(|place| light[*place as usize] = found);
         }
@@ -228,7 +220,7 @@ impl<'a> Blocks<'a> {
         };
         let mut steep: Vec<usize> = (0..self.blocks.len()).filter(|own| is_steep(*own) && is_backed(own)).collect();
         steep.sort_by(|a, b| steepness[*b].total_cmp(&steepness[*a]).then(a.cmp(b)));
-        let mut gathers = vec![None; self.gathers.len()];
+        let mut shapes = vec![None; self.shapes.len()];
         let mut left = self.blocks.len();
         let mut is_near = vec![false; self.blocks.len()];
         for own in &steep {
@@ -236,7 +228,7 @@ impl<'a> Blocks<'a> {
             let Some(rest) = left.checked_sub(places.len()) else { break };
             left = rest;
             is_near[*own] = true;
-            places.iter().for_each(|place| gathers[*place as usize] = Some(Shape::Flat));
+            places.iter().for_each(|place| shapes[*place as usize] = Some(Shape::Flat));
         }
         if steep.is_empty() {
             return None;
@@ -245,11 +237,11 @@ impl<'a> Blocks<'a> {
             let reaches = |own: usize| is_near[own] || self.beside.0[own].iter().any(|other| is_near[*other as usize]);
             is_near = (0..is_near.len()).into_par_iter().map(reaches).collect();
         }
-        let is_rim = |own: &usize| is_near[*own] && gathers[self.blocks[*own].chosen as usize].is_none();
+        let is_rim = |own: &usize| is_near[*own] && shapes[self.blocks[*own].chosen as usize].is_none();
         let found = |own: usize| finding(&stations[self.blocks[own].chosen as usize], gathered.halves[own]);
         // All together no more than there were: memory was asked for as many.
         let rim = (0..is_near.len()).filter(is_rim).take(left).map(found).collect();
-        Some((Blocks::of(self.view, gathers, 1, self.blocks.len()), rim))
+        Some((Blocks::of(self.view, shapes, 1, self.blocks.len()), rim))
     }
 
     /// Light that the chosen places gather, and share with each other and with what a `rim` around them found; nothing where time does not do for the fewest rays, unless this `is_least` that is done.
@@ -535,7 +527,7 @@ mod tests {
         let is_rim = |finding: &Finding| {
             let seen = view.seen.iter().position(|seen| seen.place.point == finding.point).unwrap();
             let x = pixel(&view, seen as u32)[0] / 2;
-            own.gathers[seen].is_none() && (16 - 5 * AROUND..16 + 5 * AROUND).contains(&x)
+            own.shapes[seen].is_none() && (16 - 5 * AROUND..16 + 5 * AROUND).contains(&x)
         };
         assert!(rim.len() > 100 && rim.iter().all(is_rim), "{}", rim.len());
 
@@ -561,7 +553,7 @@ mod tests {
 
         let blocks = Blocks::new(&baked.solution, &view, &stations, 1);
         assert_eq!(blocks.side, 2);
-        let mut gathered = blocks.gathered(&baked, &stations, &[], false, &()).unwrap().unwrap();
+        let gathered = blocks.gathered(&baked, &stations, &[], false, &()).unwrap().unwrap();
         let (closer, _) = blocks.closer(&baked.solution, &stations, &gathered).unwrap();
         // What lies between blocks, over the field that the picture has: without pixels that gather all of it would be that.
         let solution = &baked.solution;
@@ -575,9 +567,9 @@ mod tests {
         let at = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
         let mut between: Vec<Bands> = stations.iter().map(at).collect();
         let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
-        blocks.beside.unless_sure(&mut gathered, &field);
-        blocks.add(&gathered.light, &field, &mut between);
-        assert!((0..light.len()).all(|i| closer.gathers[i].is_some() || light[i] == between[i]));
+        let shown = blocks.beside.by_scales(&gathered.light, &gathered.apart, Some(&field));
+        blocks.add(&shown, &field, &mut between);
+        assert!((0..light.len()).all(|i| closer.shapes[i].is_some() || light[i] == between[i]));
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();
         let places: Vec<Place> = some.iter().map(|i| stations[*i].place).collect();
         let truth = baked.solution.halves_at(&places, 1024, 99, &()).unwrap();
