@@ -4,7 +4,10 @@ use radiosity_scene::{Bands, luminance};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// How often the size of details, and that of their noise, is evened out with those around.
+/// How often the light around is evened out with that of those around: once, all blocks beside one that met a bright path are brighter, in a square; with 4 more noise is left in the dark beside light.
+const LEVEL: usize = 3;
+
+/// How often the size of details, and that of their noise, is.
 const FARTHER: usize = 4;
 
 /// How many widths of detail there are below what is as wide as an element.
@@ -34,13 +37,19 @@ impl Neighbours {
         self.0.par_iter().enumerate().map(mean).collect()
     }
 
+    /// Values evened out so many `times`.
+    fn evened<const N: usize>(&self, times: usize, values: Vec<[f32; N]>) -> Vec<[f32; N]> {
+        (0..times).fold(values, |values, _| self.means(|own| values[own]))
+    }
+
     /// What of `light` stands out over what lies `below` it, if there is anything: what they differ by, relative to the light around, is split into details of
     /// [`SCALES`] + 1 widths (à trous; Starck and Murtagh 1994), and each is kept as far as in a wide surrounding it is larger than its noise (a Wiener filter), which the halves of the rays, so far `apart` from the light, tell.
     pub fn by_scales(&self, light: &[Bands], apart: &[f32], below: Option<&[Bands]>) -> Vec<Bands> {
         let is_alone = below.is_none();
         let below = |own: usize| below.map_or([0.0; 3], |below| below[own]);
         let level = |own: usize| luminance(light[own]).max(luminance(below(own)));
-        let level = self.means(|own| [if level(own).is_finite() { level(own) } else { 0.0 }]);
+        let level = (0..light.len()).map(|own| [if level(own).is_finite() { level(own) } else { 0.0 }]).collect();
+        let level = self.evened(LEVEL, level);
         let level = |own: usize| level[own][0].max(f32::MIN_POSITIVE);
         let beyond = |own: usize| {
             let [red, green, blue]: Bands = std::array::from_fn(|k| (light[own][k] - below(own)[k]) / level(own));
@@ -58,8 +67,7 @@ impl Neighbours {
                 let [red, green, blue, apart] = details[own];
                 [luminance([red, green, blue]).powi(2), apart.powi(2)]
             };
-            let squares = (0..light.len()).map(square).collect();
-            let squares = (0..FARTHER).fold(squares, |squares: Vec<[f32; 2]>, _| self.means(|own| squares[own]));
+            let squares = self.evened(FARTHER, (0..light.len()).map(square).collect());
             for ((kept, squares), detail) in kept.iter_mut().zip(squares).zip(details) {
                 let [all, noise] = squares;
                 let [.., apart] = detail;
