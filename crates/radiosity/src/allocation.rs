@@ -33,6 +33,12 @@ impl Lit {
     pub fn sampled(light: Vec<Bands>) -> Lit {
         Lit { is_exact: vec![false; light.len()], light }
     }
+
+    /// The mean of two halves.
+    pub fn of_halves(halves: &[HalvedLight]) -> Lit {
+        let (light, is_exact) = halves.iter().map(|half| (mean(half.light), half.is_exact)).unzip();
+        Lit { light, is_exact }
+    }
 }
 
 /// What rays found so far.

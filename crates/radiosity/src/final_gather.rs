@@ -9,7 +9,7 @@
 
 use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, mean};
 use crate::answer::Station;
-use crate::believed::apart;
+use crate::believed::{GATHERED, apart};
 use crate::blocks::{Blocks, Shape};
 use crate::pace::{self, Cost};
 use crate::pixels::{DARK, seen};
@@ -170,11 +170,11 @@ pub(crate) fn indirect(
     if let Some(mut gathered) = gathered {
         let field = chosen(&blocks, &light);
         let below = (!solution.options.looked_up).then_some(&field[..]);
-        gathered.light = blocks.beside.by_scales(&gathered.light, &gathered.apart, below);
+        gathered.light = blocks.beside.by_scales((&gathered.light, &gathered.apart), below, &GATHERED);
         blocks.add(&gathered.light, &field, &mut light);
     }
     if let Some((closer, Gathered { light: found, apart, .. })) = closer.zip(closely) {
-        let found = closer.beside.by_scales(&found, &apart, Some(&chosen(&closer, &light)));
+        let found = closer.beside.by_scales((&found, &apart), Some(&chosen(&closer, &light)), &GATHERED);
         for (block, found) in closer.blocks.iter().zip(found) {
             block.places.iter().for_each(|place| light[*place as usize] = found);
         }
@@ -567,7 +567,7 @@ mod tests {
         let at = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
         let mut between: Vec<Bands> = stations.iter().map(at).collect();
         let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
-        let shown = blocks.beside.by_scales(&gathered.light, &gathered.apart, Some(&field));
+        let shown = blocks.beside.by_scales((&gathered.light, &gathered.apart), Some(&field), &GATHERED);
         blocks.add(&shown, &field, &mut between);
         assert!((0..light.len()).all(|i| closer.shapes[i].is_some() || light[i] == between[i]));
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();

@@ -33,6 +33,7 @@ pub mod factors;
 mod field;
 mod final_gather;
 mod footprint;
+mod grain;
 mod judge;
 mod levels;
 mod lightmap;

@@ -398,17 +398,17 @@ impl Plane {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::{Mesh, Solution, SolveOptions, Tracer, cornell_box};
     use radiosity_scene::{Camera, Side};
     use radiosity_trace::Place;
     use radiosity_transport::Shadowing;
 
-    const SIZE: u32 = 96;
+    pub(crate) const SIZE: u32 = 96;
 
     /// A picture of a floor, of which the pixels from some column on show a part that lies lower.
-    fn floors(step: u32) -> ViewRays {
+    pub(crate) fn floors(step: u32) -> ViewRays {
         let place = |pixel: u32| {
             let [x, y] = [pixel % SIZE, pixel / SIZE];
             let point = DVec3::new(f64::from(x), f64::from(y), if x < step { 0.0 } else { -30.0 });

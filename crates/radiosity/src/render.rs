@@ -1,9 +1,12 @@
 //! A picture of a solution: direct light found at places that pixels show (`pixels.rs`), indirect light gathered at some of them
 //! (`final_gather.rs`).
 
+use crate::allocation::Lit;
 use crate::answer::Station;
+use crate::believed::apart;
 use crate::edges::Edges;
 use crate::final_gather;
+use crate::grain;
 use crate::measure::{certify, most_paths};
 use crate::monitor::{Monitor, Timed};
 use crate::pace::{self, Cost};
@@ -122,7 +125,8 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     let cost = left().map(|_| cost(solution, &stations, &options.shadowing, monitor)).transpose()?;
     let mut shadowing = options.shadowing;
     let (mut is_first, mut is_hurried) = (true, false);
-    let direct = tiles.direct(&indirect, |own| {
+    let mut halves_apart = vec![0.0; stations.len()];
+    let mut direct = tiles.direct(&indirect, |own| {
         if let (Some(cost), Some(seconds)) = (&cost, left()) {
             // All that follows is planned with the first ones.
             let part = if is_first { tiles.part() + SOFTENED } else { own.len() as f64 / stations.len() as f64 };
@@ -135,8 +139,17 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         }
         is_first = false;
         let places: Vec<Place> = own.iter().map(|place| stations[*place as usize].place).collect();
-        Ok(Some((solution.direct_by(&places, &shadowing, 0, monitor)?, shadowing.rays)))
+        if shadowing.rays == options.shadowing.rays {
+            return Ok(Some((solution.direct_by(&places, &shadowing, 0, monitor)?, shadowing.rays)));
+        }
+        let of_half = Shadowing { rays: shadowing.rays / 2, ..shadowing };
+        let halves = solution.direct_halves_of(&solution.places(places, 0), &of_half, monitor)?;
+        own.iter().zip(&halves).for_each(|(place, half)| halves_apart[*place as usize] = apart(half.light));
+        Ok(Some((Lit::of_halves(&halves), shadowing.rays)))
     })?;
+    if shadowing.rays < options.shadowing.rays {
+        grain::even_out(&view, &mut direct, &halves_apart);
+    }
     let both = |(h, d): (&Bands, &Bands)| -> Bands { std::array::from_fn(|band| h[band] + d[band]) };
     // One in each of as many stretches of what is seen, by how much of the picture places fill: slivers are many and little is seen of them.
     let more = if pace::left(monitor).is_some() { 1 } else { MORE };
