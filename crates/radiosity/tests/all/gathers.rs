@@ -107,6 +107,21 @@ fn what_lies_beside_a_lamp_has_its_light_and_is_sought() {
     }
 }
 
+/// Few rays beside such a band find more or less than there is, never less than nothing.
+#[test]
+fn irradiance_is_never_below_nothing() {
+    let scene = beneath_a_ceiling();
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    let options = SolveOptions { element_size: Some(0.3), rays: 64, looked_up: true, ..SolveOptions::default() };
+    let solution = Solution::new(&tracer, &options, &()).unwrap();
+    let at = |k: u32| DVec3::new(1.0 + 0.05 * f64::from(k % 40), 0.0, 2.3 + 0.005 * f64::from(k / 40));
+    let places: Vec<Place> = (0..1600).map(|k| stations::snap(&tracer, at(k), DVec3::Y)).collect();
+    let answer = solution.gathered(&places, 8, &Shadowing { places: 1, rays: 16 }, &()).unwrap();
+    let least = answer.irradiance.iter().flatten().copied().fold(f32::INFINITY, f32::min);
+    assert!(least >= 0.0, "{least}");
+}
+
 /// The elements beside the strip are as small as the band that it lights: without that four rounds came no nearer than 0.46 %, and answers
 /// were too bright.
 #[test]
