@@ -92,7 +92,7 @@ fn read(stations: &[Station], direct: Vec<Bands>, field: &Field) -> Answer {
         .zip(&direct)
         .map(|(s, d)| {
             let h = field.at(s.place.triangle as usize, s.uv, s.side);
-            std::array::from_fn(|band| d[band] + h[band].max(0.0))
+            std::array::from_fn(|band| d[band] + h[band])
         })
         .collect();
     Answer { irradiance, direct, standard_error: vec![[0.0; 3]; stations.len()] }
@@ -132,8 +132,7 @@ impl Solution<'_> {
         let halves = self.halves_at(places, rays, 0, monitor)?;
         let mut answer = Answer { direct, ..Answer::default() };
         for (HalvedLight { light: [a, b], .. }, d) in halves.iter().zip(&answer.direct) {
-            // What paths find beyond what they look up may be less than nothing.
-            answer.irradiance.push(std::array::from_fn(|k| d[k] + (0.5 * (a[k] + b[k])).max(0.0)));
+            answer.irradiance.push(std::array::from_fn(|k| d[k] + 0.5 * (a[k] + b[k])));
             answer.standard_error.push(std::array::from_fn(|k| 0.5 * (a[k] - b[k]).abs()));
         }
         Ok(answer)

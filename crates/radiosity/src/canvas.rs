@@ -200,10 +200,8 @@ impl<'b, 'a> Canvas<'b, 'a> {
         let found = texels::light(judge.baked(), sheet, &at, (judge.gathers(), judge.thinned()), monitor)?;
         let (mut light, mut smooth) = (vec![[f32::NAN; 3]; texels.len()], vec![None; texels.len()]);
         for (&i, (d, p)) in shown.iter().zip(found.direct.iter().zip(&found.indirect)) {
-            // What paths find beyond what they look up may be less than nothing.
-            let indirect = p.light.map(|e| e.max(0.0));
-            light[i] = std::array::from_fn(|k| d[k] + indirect[k]);
-            smooth[i] = (p.own < SMOOTH).then_some(indirect);
+            light[i] = std::array::from_fn(|k| d[k] + p.light[k]);
+            smooth[i] = (p.own < SMOOTH).then_some(p.light);
         }
         let is_doubtful =
             |(is_hidden, station): (&bool, &Station)| *is_hidden && is_shown_in_part(self.solution, station);

@@ -30,6 +30,9 @@ const OWN_SHARE: f64 = 0.5;
 /// Part of the squared error that is left to writing that a round aims at: the rest is for what the aim has wrong.
 const AIM: f64 = 0.8;
 
+/// What writing may add where the solution leaves nothing of what is asked, as part of the squared error of what can be had: a map six times as far off as its solution is of use to nobody.
+const SPARE: f64 = 0.25;
+
 /// Part of the squared error that writing adds that a round leaves at least: what a thin shadow looks like more closely is seen
 /// step by step.
 pub(crate) const STEP: f64 = 0.1;
@@ -272,7 +275,7 @@ impl<'b, 'a> Judge<'b, 'a> {
     /// # Errors
     /// [`Error::Stopped`].
     pub fn audit(&mut self, monitor: &dyn Monitor, read: impl Fn(&Station) -> Bands + Sync) -> Result<Audit, Error> {
-        let Baked { error, stages, watched, achieved, .. } = self.baked;
+        let Baked { error, stages, watched, .. } = self.baked;
         let read_back: Vec<Bands> = watched.par_iter().map(&read).collect();
         let paths = most_paths(*error);
         if !self.is_close {
@@ -280,7 +283,7 @@ impl<'b, 'a> Judge<'b, 'a> {
             let audit = certify(&mut self.auditor, &plain, *error, paths, stages, monitor)?;
             // Places do not share what they gather, and so have more rays.
             let takes = self.each * (self.more.len() * (self.gather / self.rays_of(1.0).0.max(1)).max(1)) as f64;
-            if audit.upper <= *error || !achieved || !self.or_hurried(has_time(monitor, takes)) {
+            if audit.upper <= self.reachable() || !self.or_hurried(has_time(monitor, takes)) {
                 return Ok(audit);
             }
             // The edges that are left may be so narrow that no place of the audit meets one.
@@ -296,28 +299,34 @@ impl<'b, 'a> Judge<'b, 'a> {
         certify(&mut self.auditor, &closely, *error, paths, stages, monitor)
     }
 
-    /// What is to be done for the error asked after an audit; nothing where it is met, or cannot be.
+    /// The error asked, or that of the solution where it missed this: light that is written is no better.
+    pub fn reachable(&self) -> f64 {
+        self.baked.error.max(self.baked.audit.upper)
+    }
+
+    /// What is to be done after an audit for the error asked, or one near that of the solution; nothing where it is met.
     ///
     /// # Errors
     /// [`Error::Stopped`].
     pub fn goal(&mut self, audit: &Audit, monitor: &dyn Monitor) -> Result<Option<Goal>, Error> {
-        let asked = self.baked.error;
-        if audit.upper <= asked || !self.baked.achieved {
+        let reachable = self.reachable();
+        if audit.upper <= reachable {
             return Ok(None);
         }
         let square = |x: f64| x * x;
-        let enough = OWN_SHARE.sqrt() * asked;
+        let enough = OWN_SHARE.sqrt() * reachable;
         let at = std::mem::take(&mut self.at);
         let before = self.certify(&at, enough, monitor)?;
         self.at = at;
-        let relight = self.look_closer(before.upper, enough, monitor)?;
+        let relight = self.baked.achieved && self.look_closer(before.upper, enough, monitor)?;
         let solution = self.auditor.judge(&self.at);
         // Squared errors and what the bounds add to them: the first go with the part left, the second, which come from few
         // places with much of it, with its root q: x q² + y q = what is allowed beyond the solution's own bound.
         let x = (square(audit.error) - square(before.error)).max(0.0);
         let y = (square(audit.upper) - square(before.upper) - x).max(0.0);
-        let allowed = AIM * (square(asked) - square(solution.upper));
-        if allowed <= 0.0 || x + y <= 0.0 {
+        let spare = square(reachable) - square(solution.upper);
+        let allowed = AIM * if spare > 0.0 { spare } else { SPARE * square(reachable) };
+        if x + y <= if spare > 0.0 { 0.0 } else { allowed } {
             return Ok(None);
         }
         let q = 2.0 * allowed / (y + (y * y + 4.0 * x * allowed).sqrt());

@@ -166,7 +166,7 @@ pub fn lightmap(
         && rounds.len() <= ROUNDS
         && !is_stalled(&rounds)
         && !is_over(monitor)
-        && (last.audit.upper <= baked.error || !baked.achieved || judge.has_time(STEP * texels, EDGES, monitor))
+        && (last.audit.upper <= judge.reachable() || judge.has_time(STEP * texels, EDGES, monitor))
     {
         let Some(goal) = judge.goal(&last.audit, monitor)? else { break };
         let detail = canvas.detail(&last.drawn, tolerance);

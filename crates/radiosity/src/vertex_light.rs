@@ -62,7 +62,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
     while rounds.len() <= ROUNDS
         && !is_stalled(&rounds)
         && !is_over(monitor)
-        && (audit.upper <= baked.error || !baked.achieved || judge.has_time(lattice.at.len() as f64, 0.0, monitor))
+        && (audit.upper <= judge.reachable() || judge.has_time(lattice.at.len() as f64, 0.0, monitor))
     {
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let lost = lattice.lost(solution, &faces, tolerance);
@@ -292,6 +292,7 @@ impl Lattice {
             Some((sum, n)) => Some(sum.map(|s| (s / n) as f32)),
             None => *e,
         };
+        // What paths find beyond what they look up may be less than nothing.
         let mut values = light.iter().enumerate().map(own);
         for primitive in &mut self.primitives {
             let irradiance = values.by_ref().take(primitive.vertices.len()).collect();
@@ -380,7 +381,8 @@ fn continued(mut values: Vec<Option<Bands>>, triangles: &[[u32; 3]]) -> Vec<Band
             values[v as usize] = Some(sum.map(|s| s / count));
         }
     }
-    values.into_iter().map(Option::unwrap_or_default).collect()
+    // What paths find beyond what they look up may be less than nothing.
+    values.into_iter().map(|value| value.unwrap_or_default().map(|e| e.max(0.0))).collect()
 }
 
 /// Weights of the corners of a triangle at a point; all are positive inside.
@@ -388,4 +390,17 @@ fn weights([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
     let area = (b - a).perp_dot(c - a);
     let [v, w] = [(point - a).perp_dot(c - a) / area, (b - a).perp_dot(point - a) / area];
     [1.0 - v - w, v, w]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Vertices that are hidden take the mean of those around, and none has less than nothing.
+    #[test]
+    fn hidden_vertices_are_told_by_those_around() {
+        let values = vec![Some([-2.0; 3]), Some([4.0; 3]), None, None];
+        let all = continued(values, &[[0, 1, 2], [1, 2, 3]]);
+        assert_eq!(all, [[0.0; 3], [4.0; 3], [2.0; 3], [4.0; 3]]);
+    }
 }

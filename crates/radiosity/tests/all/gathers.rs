@@ -3,8 +3,8 @@
 use glam::DVec3;
 use radiosity::transport::Shadowing;
 use radiosity::{
-    Material, MeasureOptions, Mesh, Place, Referee, Scene, Solution, SolveOptions, Tracer, Up, cornell_box, luminance,
-    measure, stations,
+    BakeOptions, Material, MeasureOptions, Mesh, Place, Referee, Scene, Solution, SolveOptions, Tracer, Up, bake,
+    cornell_box, lightmap, luminance, measure, stations,
 };
 
 /// The Cornell box with so many lamps more beneath its ceiling, each an object, a pyramid of four triangles that points down. Each hangs over a
@@ -107,19 +107,16 @@ fn what_lies_beside_a_lamp_has_its_light_and_is_sought() {
     }
 }
 
-/// Few rays beside such a band find more or less than there is, never less than nothing.
+/// A map of that room is made finer as far as it takes to be near its solution, where this misses what is asked, too.
 #[test]
-fn irradiance_is_never_below_nothing() {
+fn a_map_is_near_a_solution_that_misses_what_is_asked() {
     let scene = beneath_a_ceiling();
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
-    let options = SolveOptions { element_size: Some(0.3), rays: 64, looked_up: true, ..SolveOptions::default() };
-    let solution = Solution::new(&tracer, &options, &()).unwrap();
-    let at = |k: u32| DVec3::new(1.0 + 0.05 * f64::from(k % 40), 0.0, 2.3 + 0.005 * f64::from(k / 40));
-    let places: Vec<Place> = (0..1600).map(|k| stations::snap(&tracer, at(k), DVec3::Y)).collect();
-    let answer = solution.gathered(&places, 8, &Shadowing { places: 1, rays: 16 }, &()).unwrap();
-    let least = answer.irradiance.iter().flatten().copied().fold(f32::INFINITY, f32::min);
-    assert!(least >= 0.0, "{least}");
+    let baked = bake(&tracer, &BakeOptions { error: 0.01, rounds: 1, ..BakeOptions::default() }, &()).unwrap();
+    let map = lightmap(&baked, None, 4096, &()).unwrap();
+    let (first, last) = (map.rounds[0].upper, map.audit.upper);
+    assert!(!baked.achieved && first > 0.4 && last < 0.4 * first, "{first} became {last}");
 }
 
 /// The elements beside the strip are as small as the band that it lights: without that four rounds came no nearer than 0.46 %, and answers

@@ -6,7 +6,7 @@ use glam::Vec2;
 use radiosity_scene::Bands;
 
 /// A row-major picture of `page` = width and height with `values[i]` at `texels[i]`, the mean where a texel is named
-/// more than once.
+/// more than once, and nothing where it is less: what paths find beyond what they look up may be.
 ///
 /// Texels outside the page and texels without a finite value are skipped; a page without any value is black.
 pub fn fill(page: [u32; 2], texels: &[Texel], values: &[Bands]) -> Vec<Bands> {
@@ -20,7 +20,7 @@ pub fn fill(page: [u32; 2], texels: &[Texel], values: &[Bands]) -> Vec<Bands> {
             *count += 1;
         }
     }
-    let mean = |(sum, count): ([f64; 3], u32)| (count > 0).then(|| sum.map(|s| (s / f64::from(count)) as f32));
+    let mean = |(sum, count): ([f64; 3], u32)| (count > 0).then(|| sum.map(|s| (s / f64::from(count)).max(0.0) as f32));
 
     // A chart continues into the texels around it: rounded texture coordinates give those a weight of a millionth or so,
     // and the mean of their surroundings may be a bright room's.

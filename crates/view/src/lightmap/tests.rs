@@ -412,6 +412,14 @@ fn both_sides_of_a_seam_agree() {
     }
 }
 
+/// Points of a texel may find less than nothing, their mean is never less.
+#[test]
+fn a_picture_is_never_below_nothing() {
+    let texel = |x: u16| Texel { triangle: 0, uv: glam::Vec2::ZERO, x, y: 0 };
+    let picture = fill([3, 1], &[texel(0), texel(0), texel(2)], &[[-1.0; 3], [3.0; 3], [-2.0; 3]]);
+    assert_eq!(picture, [[1.0; 3], [0.5; 3], [0.0; 3]]);
+}
+
 /// A bar of shadow, a third of a texel wide and askew: with one point for each texel it falls into dashes, with the
 /// means it keeps its darkness everywhere; and where light is even no point is added.
 #[test]
