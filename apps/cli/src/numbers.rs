@@ -21,10 +21,17 @@ pub fn rough(x: f64) -> String {
     rounded(x, 2)
 }
 
-/// An illuminance to four digits, or to its whole ones.
+/// An illuminance to four digits, or to its whole ones; next to none by its power of ten.
 pub fn level(x: f64) -> String {
-    if x > 0.0 { rounded(x, 4) } else { fixed(x, 0) }
+    match x {
+        x if x >= LEAST_LEVEL => rounded(x, 4),
+        x if x > 0.0 => format!("{x:.1e}"),
+        x => fixed(x, 0),
+    }
 }
+
+/// Illuminances below this, lx, are told by a power of ten.
+const LEAST_LEVEL: f64 = 1e-4;
 
 /// A number above zero to some digits, or to its whole ones.
 fn rounded(x: f64, digits: i32) -> String {
@@ -175,8 +182,8 @@ mod tests {
         assert!(unit("0").is_err());
         assert_eq!([rough(0.000_512_7), rough(0.96), rough(47.31), rough(5236.1)], ["0.00051", "0.96", "47", "5236"]);
         assert_eq!(
-            [level(0.0), level(0.051_234_9), level(365.9765), level(27_832.9)],
-            ["0", "0.05123", "366.0", "27833"]
+            [level(0.0), level(6.233e-11), level(0.051_234_9), level(365.9765), level(27_832.9)],
+            ["0", "6.2e-11", "0.05123", "366.0", "27833"]
         );
         assert!(exposure("-7.5").is_ok() && exposure("nan").is_err() && exposure("1e300").is_err());
     }

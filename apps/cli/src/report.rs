@@ -155,6 +155,11 @@ impl ErrorReport {
         !self.achieved && self.solution_upper_95_one_sided <= self.asked
     }
 
+    /// Whether what was written is much farther off than the solution, which more time for that would hardly mend.
+    fn is_worse_than_the_solution(&self) -> bool {
+        !self.achieved && self.upper_95_one_sided > MUCH_WORSE * self.solution_upper_95_one_sided
+    }
+
     /// Says what was reached, and how far that goes.
     pub fn tell(&self, progress: &Progress) {
         progress.say(&self.line());
@@ -211,12 +216,12 @@ impl ErrorReport {
         }
         let says = match self.estimated {
             estimated if percent(estimated) == percent(0.0) && self.upper_95_one_sided > 0.0 => {
-                "cannot tell the answer from the truth".to_owned()
+                "sees nothing but its own noise".to_owned()
             }
             estimated => format!("says {}", percent(estimated)),
         };
         let mut line = format!("error asked {}: {verdict}; audit {says}, {bound}", percent(self.asked));
-        if self.is_lost_in_writing() {
+        if self.is_lost_in_writing() || self.is_worse_than_the_solution() {
             let within = percent(self.solution_upper_95_one_sided);
             line += &format!("; the solution itself is within {within}");
             if !self.finer.is_empty() {
@@ -229,6 +234,9 @@ impl ErrorReport {
 
 /// Part of all places that dim ones are at least where that is said beside the verdict: dark corners and what is beneath furniture are an eighth of a furnished office.
 const MUCH: f64 = 0.15;
+
+/// How many times as far off as its solution what was written is at least where that is said of a miss.
+const MUCH_WORSE: f64 = 2.0;
 
 fn percent(x: f64) -> String {
     format!("{:.3} %", 100.0 * x)
@@ -493,8 +501,21 @@ mod tests {
     #[test]
     fn an_error_that_is_not_seen_is_not_none() {
         let [unseen, seen] = [0.0, 0.01].map(|estimated| report(estimated).line());
-        assert!(unseen.contains("reached; audit cannot tell the answer from the truth, at most 2.000 %"), "{unseen}");
+        assert!(unseen.contains("reached; audit sees nothing but its own noise, at most 2.000 %"), "{unseen}");
         assert!(seen.contains("reached; audit says 1.000 %, at most 2.000 %"), "{seen}");
+    }
+
+    /// A map that is far behind its solution when time is over tells of that, and what comes nearer.
+    #[test]
+    fn what_is_far_behind_its_solution_says_so() {
+        let of = |upper: f64| {
+            let missed =
+                ErrorReport { achieved: false, out_of_time: true, solution_upper_95_one_sided: 0.06, ..report(0.1) };
+            ErrorReport { upper_95_one_sided: upper, finer: "try more texels".to_owned(), ..missed }.line()
+        };
+        let [far, near] = [of(0.4), of(0.1)];
+        assert!(far.ends_with("; the solution itself is within 6.000 %: try more texels"), "{far}");
+        assert!(near.contains("NOT reached in the time given") && near.ends_with("with 95 % confidence"), "{near}");
     }
 
     /// Where much is dim, a verdict of the rest is not taken for one of it.
