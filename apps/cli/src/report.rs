@@ -155,7 +155,7 @@ impl ErrorReport {
         !self.achieved && self.solution_upper_95_one_sided <= self.asked
     }
 
-    /// Whether what was written is much farther off than the solution, which more time for that would hardly mend.
+    /// Whether what was written is much farther off than the solution.
     fn is_worse_than_the_solution(&self) -> bool {
         !self.achieved && self.upper_95_one_sided > MUCH_WORSE * self.solution_upper_95_one_sided
     }
@@ -235,7 +235,7 @@ impl ErrorReport {
 /// Part of all places that dim ones are at least where that is said beside the verdict: dark corners and what is beneath furniture are an eighth of a furnished office.
 const MUCH: f64 = 0.15;
 
-/// How many times as far off as its solution what was written is at least where that is said of a miss.
+/// How many times as far off as its solution what was written is at least where that is said of a miss: writing has as much to do with it as the solution from √2 on.
 const MUCH_WORSE: f64 = 2.0;
 
 fn percent(x: f64) -> String {
@@ -347,6 +347,7 @@ impl Report {
                 // One that is fine where light is rough is not beaten by a little more everywhere.
                 let advice = match map.finest > density {
                     _ if map.reduced_charts > 0 => "--max-atlas allows larger pages".to_owned(),
+                    _ if is_hurried => "allow more --time for it".to_owned(),
                     true => "no more are made unasked, --texels-per-metre sets one density everywhere".to_owned(),
                     false => format!("--texels-per-metre {:.0} comes nearer", (2.0 * density).ceil()),
                 };

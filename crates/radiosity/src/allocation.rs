@@ -109,7 +109,7 @@ impl Found {
 }
 
 /// What two halves differ by from their mean.
-pub(crate) fn halved([a, b]: [Bands; 2]) -> f32 {
+fn halved([a, b]: [Bands; 2]) -> f32 {
     0.5 * luminance(std::array::from_fn(|k| (a[k] - b[k]).abs()))
 }
 

@@ -3,9 +3,8 @@
 //! its elements are.
 //!
 //! One place in a block of a few pixels gathers for each surface that the block shows; those of a plane share what they found ([`Planes`]), and the
-//! noisy ones send more rays ([`crate::allocation`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers, shares with what blocks around found, and shows
-//! what differs from what lies between these by more than noise. Places of curved surfaces share on their facets alone, and would be grainy: of them is shown what stands out from
-//! noise by scales. Light changes with the normal there: between them lies what they found beyond the field, whether or not that is within what they found.
+//! noisy ones send more rays ([`crate::allocation`]). Of what they found is shown what stands out from noise ([`crate::believed`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers, shares with what blocks around found, and shows
+//! what stands out over what lies between these. Places of curved surfaces share on their facets alone. Light changes with the normal there: between them lies what they found beyond the field, whether or not that is within what they found.
 
 use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, mean};
 use crate::answer::Station;
@@ -170,11 +169,11 @@ pub(crate) fn indirect(
     if let Some(mut gathered) = gathered {
         let field = chosen(&blocks, &light);
         let below = (!solution.options.looked_up).then_some(&field[..]);
-        gathered.light = blocks.beside.by_scales((&gathered.light, &gathered.apart), below, &GATHERED);
+        gathered.light = blocks.beside.by_scales(&gathered.light, &gathered.apart, below, &GATHERED);
         blocks.add(&gathered.light, &field, &mut light);
     }
-    if let Some((closer, Gathered { light: found, apart, .. })) = closer.zip(closely) {
-        let found = closer.beside.by_scales((&found, &apart), Some(&chosen(&closer, &light)), &GATHERED);
+    if let Some((closer, Gathered { light: found, apart: noise, .. })) = closer.zip(closely) {
+        let found = closer.beside.by_scales(&found, &noise, Some(&chosen(&closer, &light)), &GATHERED);
         for (block, found) in closer.blocks.iter().zip(found) {
             block.places.iter().for_each(|place| light[*place as usize] = found);
         }
@@ -567,7 +566,7 @@ mod tests {
         let at = |s: &Station| field.at(s.place.triangle as usize, s.uv, s.side);
         let mut between: Vec<Bands> = stations.iter().map(at).collect();
         let field: Vec<Bands> = blocks.blocks.iter().map(|block| between[block.chosen as usize]).collect();
-        let shown = blocks.beside.by_scales((&gathered.light, &gathered.apart), Some(&field), &GATHERED);
+        let shown = blocks.beside.by_scales(&gathered.light, &gathered.apart, Some(&field), &GATHERED);
         blocks.add(&shown, &field, &mut between);
         assert!((0..light.len()).all(|i| closer.shapes[i].is_some() || light[i] == between[i]));
         let some: Vec<usize> = closer.blocks.iter().step_by(4).map(|block| block.chosen as usize).collect();

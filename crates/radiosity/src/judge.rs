@@ -30,12 +30,15 @@ const OWN_SHARE: f64 = 0.5;
 /// Part of the squared error that is left to writing that a round aims at: the rest is for what the aim has wrong.
 const AIM: f64 = 0.8;
 
-/// What writing may add where the solution leaves nothing of what is asked, as part of the squared error of what can be had: a map six times as far off as its solution is of use to nobody.
+/// What writing may add where the solution leaves nothing of the error asked, as part of its own squared error: an eighth is farther off in all.
 const SPARE: f64 = 0.25;
 
 /// Part of the squared error that writing adds that a round leaves at least: what a thin shadow looks like more closely is seen
 /// step by step.
 pub(crate) const STEP: f64 = 0.1;
+
+/// How much more of it a round leaves if it would take too many points: with 3 it would light half as many as it may.
+const STEP_BACK: f64 = 1.5;
 
 /// Whether two rounds in a row brought next to nothing.
 pub(crate) fn is_stalled(rounds: &[WrittenRound]) -> bool {
@@ -88,13 +91,22 @@ impl std::fmt::Display for WrittenRound {
     }
 }
 
-/// What there is to do for the error asked.
+/// What there is to do for the error asked, or one near that of the solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Goal {
     /// Which part may be left of the squared error that writing adds.
     pub left: f64,
     /// Whether points are lit with more rays from now on, so that what was lit before is not to be kept.
     pub relight: bool,
+    /// Whether the error asked can be met so.
+    pub is_for_asked: bool,
+}
+
+impl Goal {
+    /// Parts that rounds may leave, from the one that goes as far as a round may.
+    pub fn steps(&self) -> impl Iterator<Item = f64> {
+        std::iter::successors(Some(self.left.max(STEP)), |left| Some(STEP_BACK * left)).take_while(|left| *left < 1.0)
+    }
 }
 
 /// What the referee says of light as it was written, attempt by attempt.
@@ -269,7 +281,7 @@ impl<'b, 'a> Judge<'b, 'a> {
         Shadowing { rays, ..self.shadowing }
     }
 
-    /// Of light that is `read` back at places. Where that seems to be worse than what was asked, and the solution is not,
+    /// Of light that is `read` back at places. Where that seems to be worse than what was asked, and than the solution,
     /// it is compared with the solution at many more places, and so is what comes after it.
     ///
     /// # Errors
@@ -324,13 +336,13 @@ impl<'b, 'a> Judge<'b, 'a> {
         // places with much of it, with its root q: x q² + y q = what is allowed beyond the solution's own bound.
         let x = (square(audit.error) - square(before.error)).max(0.0);
         let y = (square(audit.upper) - square(before.upper) - x).max(0.0);
-        let spare = square(reachable) - square(solution.upper);
-        let allowed = AIM * if spare > 0.0 { spare } else { SPARE * square(reachable) };
-        if x + y <= if spare > 0.0 { 0.0 } else { allowed } {
+        let (may_add, is_for_asked) = may_add(self.baked.error, solution.upper);
+        if x + y <= if is_for_asked { 0.0 } else { may_add } {
             return Ok(None);
         }
+        let allowed = AIM * may_add;
         let q = 2.0 * allowed / (y + (y * y + 4.0 * x * allowed).sqrt());
-        Ok(Some(Goal { left: (q * q).min(AIM), relight }))
+        Ok(Some(Goal { left: (q * q).min(AIM), relight, is_for_asked }))
     }
 
     /// Looks at places with more rays, once, if the solution's bound is more than `enough`. Answers whether points that are written
@@ -371,6 +383,12 @@ impl<'b, 'a> Judge<'b, 'a> {
     }
 }
 
+/// Squared error that writing may add to such a `solution` for the error `asked`, and whether that can be met at all.
+fn may_add(asked: f64, solution: f64) -> (f64, bool) {
+    let is_for_asked = solution < asked;
+    (if is_for_asked { asked * asked - solution * solution } else { SPARE * solution * solution }, is_for_asked)
+}
+
 /// A part of some rays; no fewer than [`LEAST_RAYS`], unless there were fewer.
 pub(crate) fn thinned(rays: usize, part: f64) -> usize {
     ((rays as f64 * part) as usize).max(rays.min(LEAST_RAYS as usize))
@@ -382,4 +400,20 @@ pub(crate) fn root_mean_square(solution: &Solution) -> f64 {
     let square = |(h, w): (&Bands, &f64)| w * f64::from(luminance(*h)).powi(2);
     let sum: f64 = solution.irradiance().iter().zip(&weight).map(square).sum();
     (sum / weight.iter().sum::<f64>().max(f64::MIN_POSITIVE)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writing may add what a solution leaves of the error asked, and where it leaves nothing so much that all is an eighth farther off.
+    #[test]
+    fn writing_may_add_to_solutions_that_miss_what_is_asked() {
+        let (left, is_for_asked) = may_add(0.05, 0.03);
+        assert!(is_for_asked && (left.sqrt() - 0.04).abs() < 1e-12, "{left}");
+        let (spare, is_for_asked) = may_add(0.05, 0.0512);
+        assert!(!is_for_asked && ((1.0 + spare / 0.0512f64.powi(2)).sqrt() - 1.118).abs() < 1e-3, "{spare}");
+        let goal = Goal { left: 0.001, relight: false, is_for_asked };
+        assert!(goal.steps().next() == Some(STEP) && goal.steps().all(|left| left < 1.0));
+    }
 }

@@ -92,10 +92,6 @@ const MOST_IN_VAIN: f64 = 4.0;
 /// How many times as many texels as at first are lit in a round at most: it takes as many times as long then.
 const MOST_LIT: f64 = 3.0;
 
-/// How much more of the squared error a round leaves if it would light too many texels: with 3 it would light half as many as it
-/// may.
-const STEP_BACK: f64 = 1.5;
-
 /// Rounds after the first map: two or three of finer texels, one to mend what the estimate had wrong.
 const ROUNDS: usize = 4;
 
@@ -122,7 +118,7 @@ struct Attempt {
 }
 
 /// Bakes a solution into a lightmap. Where no density is given, texels are made finer where the light is rough until the
-/// map as it is read back meets the error that the solution was asked for.
+/// map as it is read back meets the error that the solution was asked for, or is near that of a solution that misses it.
 ///
 /// # Errors
 /// [`Error::Stopped`]; [`Error::Lightmap`] if the layout is impossible.
@@ -160,7 +156,7 @@ pub fn lightmap(
     let mut best: Option<Attempt> = None;
 
     // Finer texels while the map misses what the solution has and the texels that are needed can be had.
-    let tolerance = baked.error * root_mean_square(&baked.solution);
+    let tolerance = judge.reachable() * root_mean_square(&baked.solution);
     let mut needed = None;
     while texels_per_metre.is_none()
         && rounds.len() <= ROUNDS
@@ -172,17 +168,15 @@ pub fn lightmap(
         let detail = canvas.detail(&last.drawn, tolerance);
         let allot = |left: f64| canvas.charts.allot(&detail, left, &params);
         let whole = allot(goal.left);
-        needed = whole.as_ref().map(|whole| whole.texels);
+        needed = whole.as_ref().filter(|_| goal.is_for_asked).map(|whole| whole.texels);
         let is_reached = whole.is_some_and(|whole| whole.texels <= most.min(MOST_GROWTH * budget));
         let lit = |step: &Allotment| if goal.relight { step.texels } else { step.rough };
-        // As far as a round may go; if not all the way, it is not the last.
-        let steps = std::iter::successors(Some(goal.left.max(STEP)), |left| Some(STEP_BACK * left))
-            .take_while(|left| *left < 1.0);
         let is_near = |step: &Allotment| {
             let is_affordable = is_reached || step.texels <= most.min(MOST_IN_VAIN * budget);
             is_affordable && lit(step) <= MOST_LIT * budget && judge.has_time(lit(step), EDGES, monitor)
         };
-        let Some(step) = steps.filter_map(allot).find(is_near) else { break };
+        // As far as a round may go; if not all the way, it is not the last.
+        let Some(step) = goal.steps().filter_map(allot).find(is_near) else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
         let known = (!goal.relight).then_some((&last.drawn, &detail));

@@ -63,6 +63,9 @@ const GATHERED: f64 = 0.5;
 const SEEN: f64 = 1.5;
 const ENCODED: f64 = 0.2;
 
+/// The same of what it takes to even out the grain of few shadow rays.
+const EVENED: f64 = 0.3;
+
 /// Places of a picture that an audit looks at, over those of a solution, but under a deadline. Lines beside which light falls to a half within a pixel
 /// fill a part in some thousands of an office: a thousand places met one or none, and said 3.1 or 0.6 % by their seed.
 const MORE: usize = 4;
@@ -107,7 +110,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     let (cast, view) = pace::timed(|| cast(solution, camera, options, monitor));
     let stations: Vec<Station> =
         view.seen.iter().map(|seen| Station { place: seen.place, uv: seen.uv, side: seen.side }).collect();
-    let after = SEEN * baked.audit_seconds() + ENCODED * cast;
+    let after = SEEN * baked.audit_seconds() + (EVENED + ENCODED) * cast;
     let left = || pace::left(monitor).map(|left| (left - after).max(0.0));
     let tiles = Tiles::new(&view);
     let (indirect, is_gathered) = match left() {
@@ -125,7 +128,7 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
     let cost = left().map(|_| cost(solution, &stations, &options.shadowing, monitor)).transpose()?;
     let mut shadowing = options.shadowing;
     let (mut is_first, mut is_hurried) = (true, false);
-    let mut halves_apart = vec![0.0; stations.len()];
+    let mut halves_apart = vec![f32::NAN; stations.len()];
     let mut direct = tiles.direct(&indirect, |own| {
         if let (Some(cost), Some(seconds)) = (&cost, left()) {
             // All that follows is planned with the first ones.
@@ -145,10 +148,10 @@ pub fn render(baked: &Baked, camera: &Camera, options: &RenderOptions, monitor: 
         let of_half = Shadowing { rays: shadowing.rays / 2, ..shadowing };
         let halves = solution.direct_halves_of(&solution.places(places, 0), &of_half, monitor)?;
         own.iter().zip(&halves).for_each(|(place, half)| halves_apart[*place as usize] = apart(half.light));
-        Ok(Some((Lit::of_halves(&halves), shadowing.rays)))
+        Ok(Some((Lit::of_halves(&halves), 2 * of_half.rays)))
     })?;
     if shadowing.rays < options.shadowing.rays {
-        grain::even_out(&view, &mut direct, &halves_apart);
+        grain::even_out(&view, &mut direct, &halves_apart, solution.memory_allowed());
     }
     let both = |(h, d): (&Bands, &Bands)| -> Bands { std::array::from_fn(|band| h[band] + d[band]) };
     // One in each of as many stretches of what is seen, by how much of the picture places fill: slivers are many and little is seen of them.

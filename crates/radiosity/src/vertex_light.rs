@@ -57,7 +57,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
     let mut audit = judge.audit(monitor, |station| lattice.read(station))?;
     let mut rounds = vec![lattice.round(lit, &audit)];
 
-    let tolerance = baked.error * root_mean_square(solution);
+    let tolerance = judge.reachable() * root_mean_square(solution);
     let most = MOST_VERTICES.min((solution.memory_allowed() / VERTEX_BYTES) as f64);
     while rounds.len() <= ROUNDS
         && !is_stalled(&rounds)
@@ -67,7 +67,12 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
         let Some(goal) = judge.goal(&audit, monitor)? else { break };
         let lost = lattice.lost(solution, &faces, tolerance);
         let finer = |left: f64| finer(&faces, &lost, &division, left, most);
-        let Some(next) = finer(goal.left).and_then(|_| finer(goal.left.max(STEP))) else { break };
+        // For what is asked all the way has to go; else as far as it does.
+        let next = match goal.is_for_asked {
+            true => finer(goal.left).and_then(|_| finer(goal.left.max(STEP))),
+            false => goal.steps().find_map(finer),
+        };
+        let Some(next) = next else { break };
         monitor.note(&rounds[rounds.len() - 1].to_string());
         if goal.relight {
             known.clear();
@@ -292,7 +297,6 @@ impl Lattice {
             Some((sum, n)) => Some(sum.map(|s| (s / n) as f32)),
             None => *e,
         };
-        // What paths find beyond what they look up may be less than nothing.
         let mut values = light.iter().enumerate().map(own);
         for primitive in &mut self.primitives {
             let irradiance = values.by_ref().take(primitive.vertices.len()).collect();
@@ -382,7 +386,7 @@ fn continued(mut values: Vec<Option<Bands>>, triangles: &[[u32; 3]]) -> Vec<Band
         }
     }
     // What paths find beyond what they look up may be less than nothing.
-    values.into_iter().map(|value| value.unwrap_or_default().map(|e| e.max(0.0))).collect()
+    values.into_iter().map(|value| value.unwrap_or_default().map(|e| if e < 0.0 { 0.0 } else { e })).collect()
 }
 
 /// Weights of the corners of a triangle at a point; all are positive inside.
@@ -398,7 +402,7 @@ mod tests {
 
     /// Vertices that are hidden take the mean of those around, and none has less than nothing.
     #[test]
-    fn hidden_vertices_are_told_by_those_around() {
+    fn vertices_are_never_below_nothing_and_hidden_ones_are_told_by_those_around() {
         let values = vec![Some([-2.0; 3]), Some([4.0; 3]), None, None];
         let all = continued(values, &[[0, 1, 2], [1, 2, 3]]);
         assert_eq!(all, [[0.0; 3], [4.0; 3], [2.0; 3], [4.0; 3]]);

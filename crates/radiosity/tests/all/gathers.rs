@@ -107,9 +107,9 @@ fn what_lies_beside_a_lamp_has_its_light_and_is_sought() {
     }
 }
 
-/// A map of that room is made finer as far as it takes to be near its solution, where this misses what is asked, too.
+/// A map of that room is made finer where its solution misses what is asked, too: as far as four times its texels go.
 #[test]
-fn a_map_is_near_a_solution_that_misses_what_is_asked() {
+fn a_map_is_made_finer_where_its_solution_misses_what_is_asked() {
     let scene = beneath_a_ceiling();
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);

@@ -6,7 +6,7 @@ use glam::Vec2;
 use radiosity_scene::Bands;
 
 /// A row-major picture of `page` = width and height with `values[i]` at `texels[i]`, the mean where a texel is named
-/// more than once, and nothing where it is less: what paths find beyond what they look up may be.
+/// more than once, and nothing where it is less: light never is.
 ///
 /// Texels outside the page and texels without a finite value are skipped; a page without any value is black.
 pub fn fill(page: [u32; 2], texels: &[Texel], values: &[Bands]) -> Vec<Bands> {
