@@ -155,9 +155,10 @@ impl ErrorReport {
         !self.achieved && self.solution_upper_95_one_sided <= self.asked
     }
 
-    /// Whether what was written is much farther off than the solution.
-    fn is_worse_than_the_solution(&self) -> bool {
-        !self.achieved && self.upper_95_one_sided > MUCH_WORSE * self.solution_upper_95_one_sided
+    /// Whether a miss is told beside the solution's own error: writing lost what this had, or most of it.
+    pub fn is_told_beside_the_solution(&self) -> bool {
+        let is_worse = self.upper_95_one_sided > MUCH_WORSE * self.solution_upper_95_one_sided;
+        self.is_lost_in_writing() || (!self.achieved && is_worse)
     }
 
     /// Says what was reached, and how far that goes.
@@ -221,7 +222,7 @@ impl ErrorReport {
             estimated => format!("says {}", percent(estimated)),
         };
         let mut line = format!("error asked {}: {verdict}; audit {says}, {bound}", percent(self.asked));
-        if self.is_lost_in_writing() || self.is_worse_than_the_solution() {
+        if self.is_told_beside_the_solution() {
             let within = percent(self.solution_upper_95_one_sided);
             line += &format!("; the solution itself is within {within}");
             if !self.finer.is_empty() {
@@ -235,7 +236,7 @@ impl ErrorReport {
 /// Part of all places that dim ones are at least where that is said beside the verdict: dark corners and what is beneath furniture are an eighth of a furnished office.
 const MUCH: f64 = 0.15;
 
-/// How many times as far off as its solution what was written is at least where that is said of a miss: writing has as much to do with it as the solution from √2 on.
+/// How many times as far off as its solution what was written is at least for that to be said: three quarters of the squared error are not the solution's.
 const MUCH_WORSE: f64 = 2.0;
 
 fn percent(x: f64) -> String {
@@ -355,7 +356,11 @@ impl Report {
             }
             None => {
                 let width = solution.narrowest();
-                format!("vertices are {width:.3} m apart, try --element-size {:.3}", 0.5 * width)
+                let advice = match is_hurried {
+                    true => "allow more --time for them".to_owned(),
+                    false => format!("try --element-size {:.3}", 0.5 * width),
+                };
+                format!("vertices are {width:.3} m apart, {advice}")
             }
         };
         let lights = solution.luminaires.lights.iter().enumerate();

@@ -1,5 +1,5 @@
 //! A picture of a solution: direct light found at places that pixels show (`pixels.rs`), indirect light gathered at some of them
-//! (`final_gather.rs`).
+//! (`final_gather.rs`). Where there is no time for all shadow rays, the grain of few is evened out (`grain.rs`).
 
 use crate::allocation::Lit;
 use crate::answer::Station;
@@ -99,8 +99,8 @@ impl View {
 
 /// Looks at a solution. Places that are seen gather their indirect light, as do cells of surfaces that are not flat, until its noise is
 /// well below the error that the solution was made for, as far as some hundreds or thousands of rays bring it. Within a deadline that
-/// leaves too little for this, these gather and pixels are lit with fewer rays, for which a part of them is timed; time for the audit
-/// is left.
+/// leaves too little for this, these gather and pixels are lit with fewer rays, for which a part of them is timed, and the grain of direct light is evened
+/// out; time for the audit is left.
 ///
 /// # Errors
 /// [`Error::Stopped`].

@@ -112,7 +112,7 @@ fn verdict(report: &Report) -> String {
     };
     let advice = if achieved {
         format!("; {} was asked.", percent(asked))
-    } else if error.is_lost_in_writing() {
+    } else if error.is_told_beside_the_solution() {
         let within = percent(error.solution_upper_95_one_sided);
         format!("; {} was asked. The solution itself is within {within}: {}.", percent(asked), error.finer)
     } else if error.out_of_time {
