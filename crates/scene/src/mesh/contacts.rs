@@ -7,9 +7,10 @@
 //! has what is not opaque: grass would cut the ground to pieces, and light goes through it.
 //!
 //! Not every contact cuts. What is shorter than an element cannot part rooms: the legs of a table leave the floor as it is
-//! ([`LEAST_RUN`], [`WALL`]). Only the edge where a sheet ends cuts at any length, for a hut of sheets in a wide landscape is smaller
-//! than an element. And a triangle that is lit on one side of its contacts only, as where a pillow sinks into a couch, has
-//! nothing to be parted from: what of it is buried is left out of its elements anyway.
+//! ([`LEAST_RUN`], [`WALL`]). Only two cut at any length: the edge where a sheet ends, for a hut of sheets in a wide landscape is smaller
+//! than an element; and a sheet before the sky, as the lining of a roof, whatever goes through it from side to side, for beams
+//! are as bright as day outside. And a triangle that is lit on one side of its contacts only, as where a pillow sinks into a
+//! couch, has nothing to be parted from: what of it is buried is left out of its elements anyway.
 
 use super::boxes::Boxes;
 use super::cut::Cutter;
@@ -71,6 +72,9 @@ struct Contact {
     host: u32,
     other: u32,
     line: Line,
+    /// Whether it goes from one side of the host to another, so that the host goes through the other, on whose back may be
+    /// the sky.
+    is_through: bool,
 }
 
 /// Where a contact is: millions are kept in a scene in which all goes through all.
@@ -87,14 +91,22 @@ impl Mesh {
         let area = self.whole_area();
         let (mut list, found_all) = self.contacts(scene);
         let run = LEAST_RUN * (2.0 * area / ELEMENTS).sqrt();
-        self.keep_long(&mut list, run.min(WALL));
+        let needs_ends = |contact: &Contact| contact.is_through || matches!(contact.line, Line::Edge(..));
+        let ends = if list.iter().any(needs_ends) { self.ends_of_surfaces() } else { Vec::new() };
+        if list.iter().any(|contact| contact.is_through) {
+            let is_open = self.open_parts(&ends);
+            list.iter_mut().for_each(|contact| contact.is_through &= is_open[contact.other as usize]);
+        }
+        self.keep_long(&mut list, run.min(WALL), &ends);
         list.sort_by_key(|contact| contact.host);
 
         // Where a triangle that has to be cut crosses another one, the other is cut there too: light breaks at a line
         // only where both have their vertices on it.
         let parted: Vec<u32> = list
             .chunk_by(|a, b| a.host == b.host)
-            .filter(|contacts| self.parts(scene, contacts, run > WALL))
+            .filter(|contacts| {
+                contacts.iter().any(|contact| contact.is_through) || self.parts(scene, contacts, run > WALL)
+            })
             .map(|contacts| contacts[0].host)
             .collect();
         let is_parted = |t: u32| parted.binary_search(&t).is_ok();
@@ -196,9 +208,9 @@ impl Mesh {
         }
     }
 
-    /// Keeps the contacts that extend over a length, with those that go on from them about straight on, and edges at which
-    /// surfaces end.
-    fn keep_long(&self, list: &mut Vec<Contact>, length: f64) {
+    /// Keeps the contacts that extend over a length, with those that go on from them about straight on, edges at which
+    /// surfaces end, and what goes through a sheet.
+    fn keep_long(&self, list: &mut Vec<Contact>, length: f64, ends: &[(u32, u32)]) {
         let (mut weld, mut places) = (Weld::new(self.tolerance), Vec::new());
         let at: Vec<u32> =
             list.iter().flat_map(|contact| self.ends(contact)).map(|p| weld.vertex(&mut places, p)).collect();
@@ -247,12 +259,12 @@ impl Mesh {
                 (*low, *high) = (low.min(end), high.max(end));
             }
         }
-        let has_edges = list.iter().any(|contact| matches!(contact.line, Line::Edge(..)));
-        let ends = if has_edges { self.ends_of_surfaces() } else { Vec::new() };
         let is_end =
             |contact: &Contact| matches!(contact.line, Line::Edge(a, b) if ends.binary_search(&ordered(a, b)).is_ok());
         let mut reach = runs.into_iter().map(|run| bounds[run as usize]).map(|[low, high]| low.distance(high));
-        list.retain(|contact| reach.next().is_some_and(|reach| reach > length) || is_end(contact));
+        list.retain(|contact| {
+            reach.next().is_some_and(|reach| reach > length) || is_end(contact) || contact.is_through
+        });
         list.shrink_to_fit();
     }
 
@@ -261,6 +273,19 @@ impl Mesh {
         let sides = self.sides_of_edges();
         let open = sides.chunk_by(|a, b| a.edge == b.edge).filter(|faces| !is_balanced(faces));
         open.map(|faces| faces[0].edge).collect()
+    }
+
+    /// Whether the part of the mesh that each triangle belongs to ends somewhere, at one of these edges.
+    fn open_parts(&self, ends: &[(u32, u32)]) -> Vec<bool> {
+        let mut parts = Union::new(self.vertices.len());
+        for [a, b, c] in &self.triangles {
+            parts.join(*a as usize, *b as usize);
+            parts.join(*a as usize, *c as usize);
+        }
+        let parts = parts.names();
+        let mut is_open = vec![false; self.vertices.len()];
+        ends.iter().for_each(|(end, _)| is_open[parts[*end as usize] as usize] = true);
+        self.triangles.iter().map(|[corner, ..]| is_open[parts[*corner as usize] as usize]).collect()
     }
 
     /// Puts pieces in the place of triangles, which come in ascending order.
@@ -326,7 +351,7 @@ impl Mesh {
             let ends = [corners[of][*i], corners[of][(i + 1) % 3]];
             if length_within(ends, corners[1 - of], normals[1 - of], self.tolerance) > 2.0 * self.tolerance {
                 let line = Line::Edge(names[of][*i], names[of][(i + 1) % 3]);
-                list.push(Contact { host: pair[1 - of], other: pair[of], line });
+                list.push(Contact { host: pair[1 - of], other: pair[of], line, is_through: false });
             }
         }
         if edges != [None, None] || !hosts.contains(&true) {
@@ -340,9 +365,13 @@ impl Mesh {
         let to = if place(&p[1]) < place(&q[1]) { p[1] } else { q[1] };
         if place(&to) - place(&from) > 2.0 * self.tolerance {
             let crossed = (0..2).filter(|host| hosts[*host]);
-            let line =
-                |host: usize| Contact { host: pair[host], other: pair[1 - host], line: Line::Crossing([from, to]) };
-            list.extend(crossed.map(line));
+            let contact = |host: usize| {
+                let own = [p, q][host];
+                let is_through =
+                    !scene.sky.is_black() && place(&own[0]) >= place(&from) && place(&own[1]) <= place(&to);
+                Contact { host: pair[host], other: pair[1 - host], line: Line::Crossing([from, to]), is_through }
+            };
+            list.extend(crossed.map(contact));
         }
     }
 
@@ -414,7 +443,7 @@ fn length_within([start, end]: [DVec3; 2], corners: [DVec3; 3], up: DVec3, margi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Material;
+    use crate::{Material, Sky};
     use glam::DVec2;
 
     fn scene(quads: &[[[f64; 3]; 4]]) -> Scene {
@@ -427,6 +456,38 @@ mod tests {
     }
 
     const FLOOR: [[f64; 3]; 4] = [[0., 0., 0.], [4., 0., 0.], [4., 3., 0.], [0., 3., 0.]];
+
+    /// A beam, however thin, is cut where it goes through a sheet behind which is the sky, and not where it ends in a solid.
+    #[test]
+    fn beams_are_cut_by_sheets_before_the_sky_and_not_by_solids() {
+        let corner = |low: [f64; 3], high: [f64; 3], k: usize| {
+            [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { high[axis] } else { low[axis] })
+        };
+        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        for (is_solid, low, sky) in
+            [(false, -1.0, Sky::Uniform([1.0; 3])), (false, -1.0, Sky::Black), (true, -0.2, Sky::Uniform([1.0; 3]))]
+        {
+            let is_whole = is_solid || sky.is_black();
+            let mut scene = Scene { materials: vec![Material::default()], sky, ..Scene::default() };
+            for face in faces {
+                scene.add_quad("beam", 0, face.map(|k| DVec3::from(corner([1.0, 1.0, low], [1.03, 1.03, 1.0], k))));
+            }
+            match is_solid {
+                true => faces.iter().for_each(|face| {
+                    scene.add_quad("slab", 0, face.map(|k| DVec3::from(corner([0.0, 0.0, -0.5], [4.0, 3.0, 0.0], k))));
+                }),
+                false => drop(scene.add_quad("sheet", 0, FLOOR.map(DVec3::from))),
+            }
+            let mesh = Mesh::new(&scene);
+            let goes_through = |t: usize| {
+                let heights = mesh.corners(t).map(|p| p.z);
+                scene.triangle_object[mesh.source[t] as usize] == 0
+                    && heights.iter().any(|z| *z > 1e-3)
+                    && heights.iter().any(|z| *z < -1e-3)
+            };
+            assert_eq!((0..mesh.triangles.len()).any(goes_through), is_whole);
+        }
+    }
 
     /// A wall, one high, from one point of the floor to another.
     fn wall([x, y]: [f64; 2], [u, v]: [f64; 2]) -> [[f64; 3]; 4] {
