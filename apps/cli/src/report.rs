@@ -175,7 +175,10 @@ impl ErrorReport {
                 format!("there the audit says {}, at most {}", percent(dim.error), percent(upper))
             }
             upper if upper.is_finite() => {
-                format!("there the audit knows no more than that it is at most {}", percent(upper))
+                format!(
+                    "there the audit knows no more than that it is at most {}; points there, measured by themselves, tell more",
+                    percent(upper)
+                )
             }
             _ => "there the audit's paths tell nothing: only of points there, by themselves, may they tell more"
                 .to_owned(),
@@ -200,7 +203,7 @@ impl ErrorReport {
             (false, true) => "NOT reached in the time given",
             (false, false) if self.is_lost_in_writing() || self.upper_95_one_sided.is_infinite() => "NOT reached",
             (false, false) if self.left_open => {
-                "NOT reached for certain (light comes by few bright paths, and those of the audit leave it open)"
+                "NOT shown to be reached (light comes by few bright paths, and those of the audit leave it open)"
             }
             (false, false) if self.stalled => "NOT reached (the last rounds came no nearer: more would hardly help)",
             (false, false) => "NOT reached (allow more --rounds, more --memory or, if given, a smaller --element-size)",
@@ -553,7 +556,7 @@ mod tests {
         let [by_rounds, in_vain, open] = [[false, false], [true, false], [true, true]].map(missed);
         assert!(by_rounds.contains("NOT reached (allow more --rounds"), "{by_rounds}");
         assert!(in_vain.contains("NOT reached (the last rounds came no nearer: "), "{in_vain}");
-        assert!(open.contains("NOT reached for certain (light comes by few bright paths"), "{open}");
+        assert!(open.contains("NOT shown to be reached (light comes by few bright paths"), "{open}");
     }
 
     #[test]

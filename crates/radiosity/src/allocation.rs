@@ -8,6 +8,7 @@
 //! for: an audit, which knows nothing of this, tells how much that is.
 
 use crate::Error;
+use crate::believed::apart;
 use radiosity_scene::{Bands, luminance};
 use radiosity_transport::HalvedLight;
 use std::collections::BTreeMap;
@@ -29,11 +30,6 @@ pub(crate) struct Lit {
 }
 
 impl Lit {
-    /// None of it.
-    pub fn sampled(light: Vec<Bands>) -> Lit {
-        Lit { is_exact: vec![false; light.len()], light }
-    }
-
     /// The mean of two halves.
     pub fn of_halves(halves: &[HalvedLight]) -> Lit {
         let (light, is_exact) = halves.iter().map(|half| (mean(half.light), half.is_exact)).unzip();
@@ -48,6 +44,8 @@ pub(crate) struct Found {
     pub light: Vec<Bands>,
     /// Standard error of each one's own light by what is known of places like it, lx.
     pub noise: Vec<f32>,
+    /// How far halves of the rays are [`apart`] in it, lx; by the first ones alone where [`Found::grow`] sent more.
+    pub apart: Vec<f32>,
     pub rays: Vec<u32>,
 }
 
@@ -55,11 +53,12 @@ impl Found {
     /// By two halves, of so many rays together, and whether what they say is known without any chance. `evened` makes standard errors, lx, of
     /// the light and what halves differ by from it, which is no number where it is known that they do not.
     pub fn of_halves(halves: &[HalvedLight], rays: u32, evened: impl FnOnce(&[Bands], &[f32]) -> Vec<f32>) -> Found {
-        let apart = |half: &HalvedLight| if half.is_exact { f32::NAN } else { halved(half.light) };
-        let (light, apart): (Vec<Bands>, Vec<f32>) = halves.iter().map(|half| (mean(half.light), apart(half))).unzip();
-        let mut noise = evened(&light, &apart);
+        let off = |half: &HalvedLight| if half.is_exact { f32::NAN } else { halved(half.light) };
+        let (light, off): (Vec<Bands>, Vec<f32>) = halves.iter().map(|half| (mean(half.light), off(half))).unzip();
+        let mut noise = evened(&light, &off);
         halves.iter().zip(&mut noise).filter(|(half, _)| half.is_exact).for_each(|(_, noise)| *noise = 0.0);
-        Found { rays: vec![rays; light.len()], light, noise }
+        let apart = halves.iter().map(|half| apart(half.light)).collect();
+        Found { rays: vec![rays; light.len()], light, noise, apart }
     }
 
     /// Takes in what further rays of all places found, and what these say of the noise, of which they know more.
@@ -69,6 +68,7 @@ impl Found {
             let (own, new) = (self.light[i], more.light[i]);
             self.light[i] = std::array::from_fn(|k| own[k] + part * (new[k] - own[k]));
             self.noise[i] = more.noise[i] * part.sqrt();
+            self.apart[i] += part * (more.apart[i] - self.apart[i]);
             self.rays[i] += more.rays[i];
         }
     }
@@ -103,6 +103,24 @@ impl Found {
                 self.noise[i] *= variance.sqrt() as f32;
                 self.rays[i] = all;
             }
+        }
+        Ok(any)
+    }
+
+    /// The same of rays with halves, which go on to tell how far they are apart.
+    pub fn grow_by_halves(
+        &mut self,
+        growth: (&[f64], f64),
+        mut send: impl FnMut(&[usize], u32) -> Result<Vec<HalvedLight>, Error>,
+    ) -> Result<bool, Error> {
+        let mut told = Vec::new();
+        let any = self.grow(growth, |own, rays| {
+            let halves = send(own, rays)?;
+            told.extend(own.iter().zip(&halves).map(|(i, half)| (*i, rays, apart(half.light))));
+            Ok(Lit::of_halves(&halves))
+        })?;
+        for (i, rays, apart) in told {
+            self.apart[i] += rays as f32 / self.rays[i] as f32 * (apart - self.apart[i]);
         }
         Ok(any)
     }
@@ -185,6 +203,32 @@ mod tests {
                 let alike = f64::powf(part, -2.0 / power) * noise.len() as f64;
                 assert!(times.iter().sum::<f64>() < 0.7 * alike, "{part}: {} of {alike}", times.iter().sum::<f64>());
             }
+        }
+    }
+
+    /// However often rays are added, halves are as far apart as if all had been sent at once.
+    #[test]
+    fn halves_go_on_to_be_told_apart() {
+        let value = |place: usize, ray: u32| unit(hash(hash(place as u32) ^ ray));
+        // Of each place the first half has the rays of even numbers.
+        let halves = |place: usize, from: u32, to: u32| {
+            let half = |k: u32| {
+                let own = (from..to).filter(|ray| ray % 2 == k);
+                own.map(|ray| value(place, ray)).sum::<f32>() / ((to - from) / 2) as f32
+            };
+            HalvedLight { light: [0, 1].map(|k| [half(k); 3]), is_exact: false }
+        };
+        let first: Vec<HalvedLight> = (0..10).map(|place| halves(place, 0, 4)).collect();
+        let mut found = Found::of_halves(&first, 4, |_, apart| apart.to_vec());
+        for times in [[1.0, 2.0, 4.0, 1.0, 8.0, 2.0, 1.0, 1.0, 4.0, 2.0], [2.0; 10]] {
+            let had = found.rays.clone();
+            let send = |own: &[usize], rays: u32| Ok(own.iter().map(|i| halves(*i, had[*i], had[*i] + rays)).collect());
+            assert!(found.grow_by_halves((&times, 1.0), send).unwrap());
+        }
+        for place in 0..10 {
+            let all = halves(place, 0, found.rays[place]).light;
+            assert!((found.apart[place] - apart(all)).abs() < 1e-6 && found.rays[place] >= 8, "{place}");
+            assert!((found.light[place][1] - mean(all)[1]).abs() < 1e-6, "{place}");
         }
     }
 

@@ -4,8 +4,8 @@
 //! edges of a few pixels are blurred where their noise is as large as they are.
 
 use radiosity_scene::{Bands, luminance};
+use radiosity_view::lightmap::Around;
 use rayon::prelude::*;
-use smallvec::SmallVec;
 
 /// How often the light around is evened out with that of those around: once, all blocks beside one that met a bright path are brighter, in a square; with 4 more noise is left in the dark beside light.
 const LEVEL: usize = 3;
@@ -32,12 +32,12 @@ pub(crate) const SHADOWED: Doubt = Doubt { farther: 2, times: 1.0 };
 const STRAY: f32 = 9.0;
 
 /// Of blocks, those of the same surface around each.
-pub(crate) struct Neighbours(pub Vec<SmallVec<[u32; 24]>>);
+pub(crate) struct Neighbours(pub Vec<Around>);
 
 impl Neighbours {
     /// Means over each block and those beside it, of values which are asked for by each of those around.
     fn means<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> Vec<[f32; N]> {
-        let mean = |(own, beside): (usize, &SmallVec<[u32; 24]>)| -> [f32; N] {
+        let mean = |(own, beside): (usize, &Around)| -> [f32; N] {
             let mut sum = of(own);
             for other in beside {
                 sum.iter_mut().zip(of(*other as usize)).for_each(|(sum, other)| *sum += other);
@@ -113,7 +113,7 @@ mod tests {
     /// Places in rows of [`SIDE`], each beside those of the 24 around that there are.
     const SIDE: usize = 40;
 
-    fn beside(own: usize) -> SmallVec<[u32; 24]> {
+    fn beside(own: usize) -> Around {
         let near = |other: &usize| {
             let apart = |a: usize, b: usize| a.abs_diff(b) <= 2;
             *other != own && apart(own % SIDE, other % SIDE) && apart(own / SIDE, other / SIDE)
@@ -195,11 +195,11 @@ mod tests {
     /// Blocks that have nobody beside them, and those of a strip, know no better of their noise than they do; where the field is right it takes most of it.
     #[test]
     fn blocks_alone_and_in_a_strip_are_as_noisy_as_they_are() {
-        let strip = |own: u32| -> SmallVec<[u32; 24]> {
+        let strip = |own: u32| -> Around {
             (own.saturating_sub(2)..=own + 2).filter(|i| *i != own && *i < (SIDE * SIDE) as u32).collect()
         };
         for (reach, most) in [(0, 0.78), (1, 0.28)] {
-            let all = (0..(SIDE * SIDE) as u32).map(|i| if reach == 0 { SmallVec::new() } else { strip(i) });
+            let all = (0..(SIDE * SIDE) as u32).map(|i| if reach == 0 { Around::new() } else { strip(i) });
             let blocks = Neighbours(all.collect());
             let halves: Vec<[Bands; 2]> = (0..SIDE * SIDE).map(two).collect();
             let light: Vec<Bands> = halves.iter().map(|halves| mean(*halves)).collect();
@@ -252,7 +252,7 @@ mod tests {
     /// Without a field no light is lost, however noisy; and what is lit stays so beside what found nothing where the field has some, or more than there are numbers for.
     #[test]
     fn by_scales_light_stays() {
-        let alone = Neighbours(vec![SmallVec::new(); SIDE * SIDE]);
+        let alone = Neighbours(vec![Around::new(); SIDE * SIDE]);
         let light: Vec<Bands> = (0..SIDE * SIDE).map(|i| mean(two(i))).collect();
         let noise: Vec<f32> = (0..SIDE * SIDE).map(|i| apart(two(i))).collect();
         for (shown, found) in alone.by_scales(&light, &noise, None, &GATHERED).iter().zip(&light) {

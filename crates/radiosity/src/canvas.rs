@@ -232,7 +232,7 @@ impl<'b, 'a> Canvas<'b, 'a> {
         Ok(values)
     }
 
-    fn stations(&self, texels: &[Texel]) -> Vec<Station> {
+    pub fn stations(&self, texels: &[Texel]) -> Vec<Station> {
         let station = |texel: &Texel| {
             let face = self.faces[texel.triangle as usize];
             stations::station(self.solution.tracer(), face.triangle, face.mesh_uv(texel.uv.as_dvec2()), face.side)

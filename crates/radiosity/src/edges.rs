@@ -263,7 +263,9 @@ mod tests {
                 let sharp: Vec<u32> =
                     edges.sharp().into_iter().filter(|&place| !beside(&view.seen[place as usize])).collect();
                 assert_eq!(sharp.len(), SIZE as usize);
-                let of = |places: &[Place]| Ok(Lit::sampled(vec![[found; 3]; places.len()]));
+                let of = |places: &[Place]| {
+                    Ok(Lit { light: vec![[found; 3]; places.len()], is_exact: vec![false; places.len()] })
+                };
                 edges.sample((tracer, camera), &sharp, of).unwrap();
                 assert!(sharp.iter().all(|&place| (edges.light[place as usize][0] - expected).abs() < 1e-3));
             }

@@ -6,9 +6,9 @@
 //! noisy ones send more rays ([`crate::allocation`]). Of what they found is shown what stands out from noise ([`crate::believed`]). Between them light is interpolated over the picture, and where it is steep every pixel gathers, shares with what blocks around found, and shows
 //! what stands out over what lies between these. Places of curved surfaces share on their facets alone. Light changes with the normal there: between them lies what they found beyond the field, whether or not that is within what they found.
 
-use crate::allocation::{Found, GATHERED_POWER, Lit, curb, growth, mean};
+use crate::allocation::{Found, GATHERED_POWER, curb, growth};
 use crate::answer::Station;
-use crate::believed::{GATHERED, apart};
+use crate::believed::GATHERED;
 use crate::blocks::{Blocks, Shape};
 use crate::pace::{self, Cost};
 use crate::pixels::{DARK, seen};
@@ -77,8 +77,8 @@ const RIM: usize = 4;
 pub(crate) struct Gathered {
     /// What all shared, lx per band.
     pub light: Vec<Bands>,
-    /// What either half of the rays of each found.
-    pub halves: Vec<[Bands; 2]>,
+    /// What each found by itself.
+    pub found: Found,
     /// Standard errors of the light, lx.
     pub noise: Vec<f32>,
     /// How far halves are [`apart`] in it, lx.
@@ -181,10 +181,10 @@ pub(crate) fn indirect(
     Ok((light, is_whole))
 }
 
-/// What two halves of the rays of a place found.
-fn finding(Station { place, side, .. }: &Station, halves: [Bands; 2]) -> Finding {
+/// What the rays of a place found.
+fn finding(Station { place, side, .. }: &Station, found: &Found, own: usize) -> Finding {
     let (point, triangle) = (place.point, place.triangle as usize);
-    Finding { point, triangle, side: *side, light: mean(halves), noise: apart(halves), weight: 1.0 }
+    Finding { point, triangle, side: *side, light: found.light[own], noise: found.apart[own], weight: 1.0 }
 }
 
 impl<'a> Blocks<'a> {
@@ -237,7 +237,7 @@ impl<'a> Blocks<'a> {
             is_near = (0..is_near.len()).into_par_iter().map(reaches).collect();
         }
         let is_rim = |own: &usize| is_near[*own] && shapes[self.blocks[*own].chosen as usize].is_none();
-        let found = |own: usize| finding(&stations[self.blocks[own].chosen as usize], gathered.halves[own]);
+        let found = |own: usize| finding(&stations[self.blocks[own].chosen as usize], &gathered.found, own);
         // All together no more than there were: memory was asked for as many.
         let rim = (0..is_near.len()).filter(is_rim).take(left).map(found).collect();
         Some((Blocks::of(self.view, shapes, 1, self.blocks.len()), rim))
@@ -268,12 +268,12 @@ impl<'a> Blocks<'a> {
         }
 
         let planes = Planes::new(solution.tracer().mesh, &solution.elements);
-        let share = |halves: &[[Bands; 2]]| -> Vec<Pooled> {
+        let share = |found: &Found| -> Vec<Pooled> {
             // Those of one plane that receive with other normals are not alike.
             let (flat, curved): (Vec<usize>, Vec<usize>) = (0..at.len()).partition(|own| self.is_flat(*own));
             let mut shared = vec![Pooled::alone([0.0; 3], 0.0); at.len()];
             for (own, rim) in [(flat, rim), (curved, &[])] {
-                let findings = own.iter().map(|i| finding(&at[*i], halves[*i])).chain(rim.iter().copied());
+                let findings = own.iter().map(|i| finding(&at[*i], found, *i)).chain(rim.iter().copied());
                 let pooled = planes.pooled(&findings.collect::<Vec<_>>());
                 own.into_iter().zip(pooled).for_each(|(own, pooled)| shared[own] = pooled);
             }
@@ -281,11 +281,9 @@ impl<'a> Blocks<'a> {
         };
         let (seconds, halves) = pace::timed(|| solution.halves_at(&places, first, 0, monitor));
         let each = seconds / first as f64;
-        let first_halves = halves?;
-        let mut found = Found::of_halves(&first_halves, first as u32, evened);
-        // Those of places around together tell the noise, bright paths and all; what is evened out by light takes part of these for detail.
-        let mut halves: Vec<[Bands; 2]> = first_halves.iter().map(|half| half.light).collect();
-        let mut pooled = share(&halves);
+        let mut found = Found::of_halves(&halves?, first as u32, evened);
+        // Halves of places around together tell the noise, bright paths and all; what is evened out by light takes part of these for detail.
+        let mut pooled = share(&found);
         let wanted = self.wanted(baked, &places, &pooled);
         let none = vec![f64::INFINITY; at.len()];
         let mut is_whole = first == FIRST;
@@ -314,28 +312,20 @@ impl<'a> Blocks<'a> {
             if allowed < WORTH {
                 break;
             }
-            let sent = found.rays.clone();
-            let any = found.grow((&times, GATHERED_POWER), |own, rays| {
+            let any = found.grow_by_halves((&times, GATHERED_POWER), |own, rays| {
                 let at: Vec<Place> = own.iter().map(|i| places[*i]).collect();
-                let more = solution.halves_at(&at, rays as usize, step, monitor)?;
-                for (&i, more) in own.iter().zip(&more) {
-                    let part = rays as f32 / (sent[i] + rays) as f32;
-                    for (own, new) in halves[i].iter_mut().zip(more.light) {
-                        *own = std::array::from_fn(|k| own[k] + part * (new[k] - own[k]));
-                    }
-                }
-                Ok(Lit::sampled(more.into_iter().map(|half| mean(half.light)).collect()))
+                solution.halves_at(&at, rays as usize, step, monitor)
             })?;
             if !any {
                 break;
             }
-            pooled = share(&halves);
+            pooled = share(&found);
         }
         // What paths find beyond what they look up may be less than nothing.
         let light = pooled.iter().map(|p| p.light.map(|e| e.max(0.0))).collect();
         let apart = pooled.iter().map(|pooled| pooled.noise).collect();
         let noise = noise(&pooled, &found);
-        Ok(Some(Gathered { light, halves, noise, apart, is_whole }))
+        Ok(Some(Gathered { light, found, noise, apart, is_whole }))
     }
 
     /// What noise is asked of `places`, one for each block, by what they found so far: it counts as the audit has it and as the eye does, relative to what light there is.
@@ -373,6 +363,7 @@ fn cost(solution: &Solution, places: &[Place], monitor: &dyn Monitor) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::allocation::mean;
     use crate::blocks::{AROUND, is_flat};
     use crate::pixels::pixel;
     use crate::{BakeOptions, Mesh, SolveOptions, Tracer, bake, cornell_box};
@@ -498,12 +489,9 @@ mod tests {
         let closer = |level: &dyn Fn(u32, [u32; 2]) -> f32, noise: f32| {
             let light: Vec<Bands> = (0..).zip(&blocks.blocks).map(|(i, block)| [level(i, block.square); 3]).collect();
             let noise = vec![noise; light.len()];
-            let halves = light.iter().map(|e| [*e; 2]).collect();
-            blocks.closer(
-                &solution,
-                &stations(&view),
-                &Gathered { light, apart: noise.clone(), halves, noise, is_whole: true },
-            )
+            let found = Found { light: light.clone(), apart: noise.clone(), ..Found::default() };
+            let gathered = Gathered { light, apart: noise.clone(), found, noise, is_whole: true };
+            blocks.closer(&solution, &stations(&view), &gathered)
         };
         // Far more than the direct light there.
         let step = |by: f32| move |_, [x, _]: [u32; 2]| if x < 16 { 1e6 } else { 1e6 * (1.0 + by) };

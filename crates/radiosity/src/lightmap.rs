@@ -71,7 +71,7 @@ impl Lightmap {
 }
 
 /// Memory that a texel takes while it is worked out, about.
-pub const TEXEL_BYTES: usize = 400;
+pub const TEXEL_BYTES: usize = 600;
 
 /// Texels that the program spends where no density is asked for, and how many for each chart where that is more: the corners of
 /// a rectangle.

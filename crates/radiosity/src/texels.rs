@@ -2,9 +2,10 @@
 //! ([`crate::allocation`]), by what halves differ by after light was shared ([`Atlas::pooled`]); direct light of thinned ones is not. In a furnished office a
 //! twentieth of the texels has two thirds of the squared error, if all have as many rays.
 
-use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, Lit, curb, growth, mean};
+use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth};
 use crate::answer::Station;
 use crate::bake::{Baked, gather_rays};
+use crate::believed::{GATHERED, Neighbours};
 use crate::judge::{root_mean_square, thinned as thin};
 use crate::measure::rays_for;
 use crate::pace;
@@ -80,6 +81,15 @@ pub(crate) fn light(
         unless_dark(found, sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.noise, &alike))
     };
 
+    // By scales, as far as halves of the rays agree ([`crate::believed`]).
+    let believed = |found: &Found| -> Vec<Pooled> {
+        let mut shared = sheet.atlas.pooled(sheet.page, sheet.texels, &found.light, &found.apart, &found.rays);
+        let (light, apart): (Vec<Bands>, Vec<f32>) = shared.iter().map(|p| (p.light, p.noise)).unzip();
+        let beside = Neighbours(sheet.atlas.beside(sheet.page, sheet.texels));
+        let light = beside.by_scales(&light, &apart, None, &GATHERED);
+        shared.iter_mut().zip(light).for_each(|(shared, light)| shared.light = light);
+        shared
+    };
     let shared = |rays: usize| -> Result<(Option<Found>, Vec<Pooled>), Error> {
         if !gathers {
             let told = |s: &Station| baked.field.at(s.place.triangle as usize, s.uv, s.side);
@@ -94,7 +104,8 @@ pub(crate) fn light(
     if thinned < 1.0 {
         let [gather, shadow] = usual_rays(error).map(|rays| thin(rays, thinned));
         let direct = solution.direct_at(&places, &shadowing(shadow), monitor)?;
-        return Ok(TexelLight { direct, indirect: shared(gather)?.1 });
+        let (gathered, indirect) = shared(gather)?;
+        return Ok(TexelLight { direct, indirect: gathered.map_or(indirect, |gathered| believed(&gathered)) });
     }
 
     let first = gather_rays(error).min(FIRST_GATHERED);
@@ -122,11 +133,71 @@ pub(crate) fn light(
         let spread: Vec<f32> = indirect.iter().map(|p| p.spread).collect();
         let mut times = growth(&spread, &area, &ceilings, GATHERED_NOISE * error * size, GATHERED_POWER);
         curb(&mut times, &gathered.rays, most_gathered.map(|most| most / first as f64));
-        gathered.grow((&times, GATHERED_POWER), |own, rays| {
-            let halves = solution.halves_at(&of(own), rays as usize, 1, monitor)?;
-            Ok(Lit::sampled(halves.into_iter().map(|half| mean(half.light)).collect()))
+        gathered.grow_by_halves((&times, GATHERED_POWER), |own, rays| {
+            solution.halves_at(&of(own), rays as usize, 1, monitor)
         })?;
-        indirect = pooled(gathered);
+        indirect = believed(gathered);
     }
     Ok(TexelLight { direct: lit.into_iter().map(|p| p.light).collect(), indirect })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::allocation::mean;
+    use crate::canvas::Canvas;
+    use crate::{BakeOptions, Material, Mesh, Scene, Sky, SolveOptions, Tracer, bake};
+    use glam::DVec3;
+    use radiosity_view::lightmap::UnwrapParams;
+
+    /// A room that is lit through a window of 40 × 40 cm.
+    fn room() -> Scene {
+        let mut scene = Scene { sky: Sky::Uniform([1000.0; 3]), ..Scene::default() };
+        scene.materials.push(Material { base_color: [0.6, 0.6, 0.6, 1.0], ..Material::default() });
+        let mut quad = |corners: [[f64; 3]; 4]| {
+            scene.add_quad("room", 0, corners.map(DVec3::from));
+        };
+        quad([[0., 0., 0.], [0., 0., 4.], [4., 0., 4.], [4., 0., 0.]]);
+        quad([[0., 3., 0.], [4., 3., 0.], [4., 3., 4.], [0., 3., 4.]]);
+        quad([[0., 0., 0.], [0., 3., 0.], [0., 3., 4.], [0., 0., 4.]]);
+        quad([[4., 0., 0.], [4., 0., 4.], [4., 3., 4.], [4., 3., 0.]]);
+        quad([[0., 0., 4.], [0., 3., 4.], [4., 3., 4.], [4., 0., 4.]]);
+        let pieces = [([0., 1.8], [0., 3.]), ([2.2, 4.], [0., 3.]), ([1.8, 2.2], [0., 1.3]), ([1.8, 2.2], [1.7, 3.])];
+        for ([x0, x1], [y0, y1]) in pieces {
+            quad([[x0, y0, 0.], [x1, y0, 0.], [x1, y1, 0.], [x0, y1, 0.]]);
+        }
+        scene
+    }
+
+    /// What few rays found through a small window is believed as far as halves of them agree, over what texels share.
+    #[test]
+    fn dots_of_gathered_light_do_not_show() {
+        let scene = room();
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let solve = SolveOptions { element_size: Some(0.4), ..SolveOptions::default() };
+        let baked =
+            bake(&tracer, &BakeOptions { error: 0.05, solve, rounds: 0, ..BakeOptions::default() }, &()).unwrap();
+        let params = UnwrapParams { texels_per_metre: 10.0, ..UnwrapParams::default() };
+        let canvas = Canvas::new(&baked.solution, &params).unwrap();
+        let atlas = canvas.charts.pack(&params).unwrap();
+        let texels = atlas.texels(0);
+        let at = canvas.stations(&texels);
+        let places: Vec<Place> = at.iter().map(|station| station.place).collect();
+        let truth = baked.solution.halves_at(&places, 2048, 99, &()).unwrap();
+        let truth: Vec<f32> = truth.iter().map(|half| luminance(mean(half.light))).collect();
+        let size = (truth.iter().map(|e| e * e).sum::<f32>() / truth.len() as f32).sqrt();
+        let sheet = Sheet { atlas: &atlas, page: 0, texels: &texels };
+        let off = |of: &dyn Fn(usize) -> Bands| {
+            let square = |i: usize| (luminance(of(i)) - truth[i]).powi(2);
+            ((0..truth.len()).map(square).sum::<f32>() / truth.len() as f32).sqrt() / size
+        };
+        let rays = thin(usual_rays(baked.error)[0], 0.5);
+        let halves = baked.solution.halves_at(&places, rays, 0, &()).unwrap();
+        let found = Found::of_halves(&halves, rays as u32, |_, apart| atlas.evened(0, &texels, apart));
+        let shared = atlas.pooled(0, &texels, &found.light, &found.noise, &found.rays);
+        let believed = light(&baked, sheet, &at, (true, 0.5), &()).unwrap().indirect;
+        let [shared, believed] = [shared, believed].map(|pooled| off(&|i| pooled[i].light));
+        assert!(believed < 0.75 * shared, "{believed} and {shared}");
+    }
 }

@@ -29,6 +29,7 @@ pub use edges::{SharedEdge, shared_edges};
 pub use fill::{fill, look_up};
 pub use flatten::Charts;
 pub use seams::{SeamInfo, SeamParams, fit_seams};
+pub use share::Around;
 pub use texels::Texel;
 
 use glam::{DVec2, DVec3, Vec2};

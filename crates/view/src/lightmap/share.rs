@@ -5,6 +5,7 @@ use crate::pool::{Pooled, Sample, pooled};
 use glam::DVec2;
 use radiosity_scene::Bands;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 /// The number of a slot without a texel.
 const NONE: u32 = u32::MAX;
@@ -12,6 +13,12 @@ const NONE: u32 = u32::MAX;
 /// Texels around one, along each axis, that tell the noise of its rays: twenty-five know it to a seventh, the nine of a
 /// corner to a quarter, and a shadow's edge is not wider.
 const AROUND: u32 = 2;
+
+/// Texels around one at most.
+const MOST_AROUND: usize = ((2 * AROUND + 1) * (2 * AROUND + 1) - 1) as usize;
+
+/// Numbers of those.
+pub type Around = SmallVec<[u32; MOST_AROUND]>;
 
 /// Charts of fewer texels than this ask those that come before and after them, up to so many texels away: most are parts of one thing.
 const FEW: usize = 9;
@@ -69,6 +76,29 @@ impl Atlas {
         for (k, (i, told)) in found.iter().enumerate() {
             let run = &found[k.saturating_sub(FEW)..(k + FEW + 1).min(found.len())];
             out[*i] = told.unwrap_or_else(|| mean(&mut run.iter().map(|(i, _)| square(*i))));
+        }
+        out
+    }
+
+    /// Of each of `texels`, each named once, those of its chart that lie around it. Charts of fewer than could lie there know too little of their noise: of theirs there are none.
+    pub fn beside(&self, page: usize, texels: &[Texel]) -> Vec<Around> {
+        let mut out = vec![Around::new(); texels.len()];
+        let of_chart = |slots: &[Option<usize>], columns: u32| -> Vec<(usize, Around)> {
+            if slots.iter().flatten().count() <= MOST_AROUND {
+                return Vec::new();
+            }
+            let rows = slots.len() as u32 / columns;
+            let around = |(slot, own): (u32, usize)| {
+                let (x, y) = (slot % columns, slot / columns);
+                let near = |x: u32, count: u32| x.saturating_sub(AROUND)..(x + AROUND + 1).min(count);
+                let around = near(y, rows).flat_map(|y| near(x, columns).map(move |x| y * columns + x));
+                let others = around.filter(|other| *other != slot).filter_map(|other| slots[other as usize]);
+                (own, others.map(|other| other as u32).collect())
+            };
+            (0..).zip(slots).filter_map(|(slot, own)| own.map(|own| (slot, own))).map(around).collect()
+        };
+        for (own, beside) in self.by_chart(page, texels, |_| true, of_chart).into_iter().flatten() {
+            out[own] = beside;
         }
         out
     }

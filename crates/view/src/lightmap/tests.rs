@@ -486,6 +486,31 @@ fn charts_end_below_walls() {
     }
 }
 
+/// Around a texel are those of its chart at most two columns and two rows away that are asked about, in a square of which corners are as near as sides; of small charts there are none.
+#[test]
+fn around_a_texel_are_those_of_its_chart() {
+    let mut mesh = Mesh::default();
+    mesh.add_box(0, DVec3::ZERO, DVec3::splat(2.0), 0.0);
+    mesh.add_box(1, DVec3::splat(4.0), DVec3::splat(4.02), 0.0);
+    let charts = Charts::new(&mesh.input(), &UnwrapParams::default()).unwrap();
+    let atlas = charts.pack(&UnwrapParams::default()).unwrap();
+    let texels: Vec<Texel> = atlas.texels(0).into_iter().filter(|texel| (texel.x + texel.y) % 5 > 0).collect();
+    let of_chart = |texel: &Texel| texel.triangle / 2;
+    let is_near = |a: &Texel, b: &Texel| {
+        a.x.abs_diff(b.x) <= 2 && a.y.abs_diff(b.y) <= 2 && of_chart(a) == of_chart(b) && a.triangle < 12
+    };
+    let beside = atlas.beside(0, &texels);
+    for own in (0..texels.len()).step_by(7) {
+        let expected: Vec<u32> = (0..texels.len())
+            .filter(|other| *other != own && is_near(&texels[own], &texels[*other]))
+            .map(|other| other as u32)
+            .collect();
+        let mut told = beside[own].to_vec();
+        told.sort_unstable();
+        assert_eq!(told, expected, "{own}");
+    }
+}
+
 /// Halves of rays that differ by chance: what is told is their root mean square around, for large charts and for
 /// many small ones, whatever lies inside solids.
 #[test]
