@@ -10,7 +10,7 @@ use crate::sampling::{hash, unit};
 use crate::shaft::Shaft;
 use crate::{Hit, Ray, Tree};
 use glam::{DVec2, DVec3, Vec3};
-use radiosity_scene::{AlphaMode, Mesh, Scene, Side};
+use radiosity_scene::{AlphaMode, EdgeSide, Mesh, Scene, Side};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::ops::ControlFlow;
@@ -96,6 +96,8 @@ pub struct Tracer<'a> {
     offset: f64,
     /// Per triangle, whether it is more than an opaque one-sided surface.
     kind: Vec<Kind>,
+    /// Per triangle, the first one of its [`sheets`]; empty where nothing lets light pass.
+    sheet: Vec<u32>,
     /// Unit normals of the triangles' fronts.
     normals: Vec<Vec3>,
     /// Per triangle, the weight above which no hit is at an edge.
@@ -205,13 +207,15 @@ impl<'a> Tracer<'a> {
             })
             .collect();
         join(&mut kind, mesh, offset);
+        let all_opaque = kind.iter().all(|k| !k.see_through);
         Tracer {
             scene,
             mesh,
             tree: Tree::over(mesh.triangles.len(), |t| mesh.corners(t).map(|p| (p - centre).as_vec3())),
             centre,
             offset,
-            all_opaque: kind.iter().all(|k| !k.see_through),
+            all_opaque,
+            sheet: if all_opaque { Vec::new() } else { sheets(&kind, mesh, offset) },
             kind,
             normals: (0..mesh.triangles.len()).into_par_iter().map(|t| mesh.normal(t).as_vec3()).collect(),
             edge: (0..mesh.triangles.len()).into_par_iter().map(|t| edge_weight(mesh.corners(t), offset)).collect(),
@@ -247,6 +251,7 @@ impl<'a> Tracer<'a> {
     pub fn bytes(&self) -> usize {
         self.tree.memory()
             + size_of_val(&*self.kind)
+            + size_of_val(&*self.sheet)
             + size_of_val(&*self.normals)
             + size_of_val(&*self.edge)
             + size_of_val(&*self.scales)
@@ -444,7 +449,7 @@ impl<'a> Tracer<'a> {
         }
         let at = self.mesh.surface(triangle as usize, DVec2::new(f64::from(u), f64::from(v)));
         let opacity = self.scene.opacity(at);
-        opacity >= 1.0 || (opacity > 0.0 && unit(hash(seed ^ hash(triangle))) < opacity)
+        opacity >= 1.0 || (opacity > 0.0 && unit(hash(seed ^ hash(self.sheet[triangle as usize]))) < opacity)
     }
 }
 
@@ -458,6 +463,42 @@ fn join(kind: &mut [Kind], mesh: &Mesh, flat: f64) {
             (kind[triangle - 1].joins, kind[triangle].joins) = (Joins::First, Joins::Last);
         }
     }
+}
+
+/// The first of the triangles that let light pass and lie, edge to edge, on one plane, to within a distance: a ray that meets several of them meets one surface, on an edge or at a
+/// corner, and either passes or does not.
+fn sheets(kind: &[Kind], mesh: &Mesh, flat: f64) -> Vec<u32> {
+    const NONE: u32 = u32::MAX;
+    let mut beside = vec![[NONE; 3]; kind.len()];
+    // Where more than two meet they may lie on each other, and each takes its part of the light.
+    for sides in mesh.sides_of_edges().chunk_by(|a, b| a.edge == b.edge) {
+        if let [one, other] = sides.iter().map(EdgeSide::place).collect::<SmallVec<[(usize, usize); 4]>>()[..]
+            && kind[one.0].see_through
+            && kind[other.0].see_through
+        {
+            beside[one.0][one.1] = other.0 as u32;
+            beside[other.0][other.1] = one.0 as u32;
+        }
+    }
+    let mut first: Vec<u32> = vec![NONE; kind.len()];
+    for triangle in 0..kind.len() {
+        if first[triangle] != NONE {
+            continue;
+        }
+        let (corner, up) = (mesh.corners(triangle)[0], mesh.normal(triangle));
+        let lies_on = |p: &DVec3| (*p - corner).dot(up).abs() <= flat;
+        first[triangle] = triangle as u32;
+        let mut left = vec![triangle];
+        while let Some(own) = left.pop() {
+            for other in beside[own].into_iter().filter(|other| *other != NONE) {
+                if first[other as usize] == NONE && mesh.corners(other as usize).iter().all(lies_on) {
+                    first[other as usize] = triangle as u32;
+                    left.push(other as usize);
+                }
+            }
+        }
+    }
+    first
 }
 
 /// A triangle's doubled area, and the lengths of the edges opposite its corners.
@@ -507,6 +548,35 @@ mod tests {
                 floor += u32::from(object == 0);
             }
             assert!((10_000..90_000).contains(&floor), "{floor}");
+        }
+    }
+
+    /// A pane takes its part of the light once, on the edges and at the corners of its triangles too; two panes take theirs each.
+    #[test]
+    fn a_pane_is_met_once_on_the_edges_of_its_triangles() {
+        let pane = |alpha| Material {
+            base_color: [0.0, 0.0, 0.0, alpha],
+            alpha_mode: AlphaMode::Blend,
+            double_sided: true,
+            ..Material::default()
+        };
+        for (heights, passes) in [(&[1.0][..], 0.6), (&[1.0, 1.5], 0.36)] {
+            let mut scene = Scene { materials: vec![pane(0.4)], ..Scene::default() };
+            for z in heights {
+                for (x, y) in [(0., 0.), (1., 0.), (0., 1.), (1., 1.)] {
+                    let corners = [[x, y, *z], [x + 1., y, *z], [x + 1., y + 1., *z], [x, y + 1., *z]];
+                    scene.add_quad("pane", 0, corners.map(DVec3::from));
+                }
+            }
+            let mesh = Mesh::new(&scene);
+            let tracer = Tracer::new(&scene, &mesh);
+            for (x, y) in [(0.5, 0.5), (0.3, 0.3), (1.0, 0.4), (0.7, 1.0), (1.0, 1.0), (0.6, 0.2)] {
+                let from = Place { point: DVec3::new(x, y, 0.0), normal: DVec3::Z, triangle: u32::MAX };
+                let ray = tracer.ray(&from, DVec3::Z, f64::INFINITY);
+                let free = |i: &u32| !tracer.blocked(&ray, hash(*i));
+                let part = (0..20_000).filter(free).count() as f64 / 20_000.0;
+                assert!((part - passes).abs() < 0.015, "{heights:?} {x} {y}: {part}");
+            }
         }
     }
 

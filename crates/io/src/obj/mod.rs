@@ -72,7 +72,7 @@ pub fn load(file: &str, bytes: &[u8], source: &dyn Source, options: &LoadOptions
 
 /// Lines by number from 1, comments removed, those that end in a backslash joined with the next.
 fn lines(text: &str) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
-    let mut numbered = text.lines().enumerate();
+    let mut numbered = bare(text).lines().enumerate();
     std::iter::from_fn(move || {
         let clean = |line: &'_ str| line.split('#').next().unwrap_or_default().trim().len();
         let (number, line) = numbered.next()?;
@@ -93,6 +93,11 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)>
         }
         Some((number + 1, joined.into()))
     })
+}
+
+/// Text without the mark of its encoding that some editors put before it.
+fn bare(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
 fn split(line: &str) -> (&str, &str) {
@@ -402,6 +407,19 @@ mod tests {
         assert_eq!((scene.triangles.len(), scene.positions.len()), (2, 4));
         assert_eq!((scene.normals[0], scene.uvs[0][0]), (Vec3::Z, Vec2::new(0.0, 1.0)));
         assert!(forwards.faults.0.is_empty(), "{}", forwards.faults);
+    }
+
+    /// Some editors put a mark of the encoding before text; nothing of the first line is lost to it, in models and libraries.
+    #[test]
+    fn marks_of_the_encoding_are_no_text() {
+        let plain = read(&format!("{QUAD}f 1 2 3\n"));
+        assert_eq!(read(&format!("\u{feff}{QUAD}f 1 2 3\n")).scene, plain.scene);
+        let library = "\u{feff}newmtl red\nKd 1 0 0\n".as_bytes().to_vec();
+        let memory = Memory([("red.mtl".to_owned(), library)].into());
+        let text = format!("\u{feff}mtllib red.mtl\n{QUAD}usemtl red\nf 1 2 3\n");
+        let loaded = load("t.obj", text.as_bytes(), &memory, &LoadOptions::default()).unwrap();
+        assert!(loaded.faults.0.is_empty(), "{}", loaded.faults);
+        assert_eq!(loaded.scene.material(0).base_color, [1.0, 0.0, 0.0, 1.0]);
     }
 
     #[test]

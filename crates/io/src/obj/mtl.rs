@@ -4,6 +4,7 @@
 //! pass (alpha blend). `Tf` and the glass of `illum` are not computed, and told where they would matter. Where a picture
 //! comes without its factor the factor is 1; a material without either is grey.
 
+use super::bare;
 use crate::{Source, picture};
 use glam::{DAffine2, DMat2, DVec2};
 use radiosity_scene::{AlphaMode, Faults, Material, Texture, TextureRef, Wrap};
@@ -64,7 +65,7 @@ impl<'a> Library<'a> {
         let folder = path.rfind(['/', '\\']).map_or("", |at| &path[..=at]);
         let text = String::from_utf8_lossy(&bytes);
         let mut current: Option<Draft> = None;
-        for (number, line) in text.lines().enumerate() {
+        for (number, line) in bare(&text).lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default().trim();
             let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
             let (rest, place) = (rest.trim(), || format!("{path}:{}", number + 1));
