@@ -58,7 +58,7 @@ impl Glimpse {
         let options = coarse(options);
         let elements = Elements::new(scene, mesh, cell_width(mesh, tracer.scales(), &options));
         let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, &elements);
-        let luminaires = Luminaires::new(scene, mesh, &elements, &area, &exitance);
+        let luminaires = Luminaires::new(tracer, &elements, &area, &exitance);
 
         // Which elements to ask, and the area that each stands for.
         let mut is_seen = vec![false; elements.len()];

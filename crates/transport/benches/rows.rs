@@ -60,7 +60,7 @@ fn stages(c: &mut Criterion) {
     let exposure = Exposure::new(&tracer, &mesh, &elements, &()).unwrap();
     let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
     let ids = IdSpace { elements: &elements, sky: SkyPatches::new(&Sky::default(), DVec3::Y) };
-    let luminaires = Luminaires::new(&scene, &mesh, &elements, &area, &exitance);
+    let luminaires = Luminaires::new(&tracer, &elements, &area, &exitance);
     assert_eq!(luminaires.lights.len(), 1, "the lamp is a light of its own");
 
     let mut group = c.benchmark_group(format!("box of {n} elements"));

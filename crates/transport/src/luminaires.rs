@@ -3,14 +3,15 @@
 
 use crate::polygon::Four;
 use glam::DVec3;
-use radiosity_scene::{AlphaMode, Bands, Elements, Mesh, PointLight, Scene, Side, luminance};
-use radiosity_trace::{Emitter, EmitterTree, quadrilateral};
+use radiosity_scene::{AlphaMode, Bands, Elements, PointLight, Scene, Side, luminance};
+use radiosity_trace::{Emitter, EmitterTree, Tracer, quadrilateral};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::ops::Range;
 
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
-/// nothing extra: its noise there is no more than that of ordinary reflected light.
+/// nothing extra: its noise there is no more than that of ordinary reflected light. What is missing of a surface around all
+/// counts as one that gives nothing: rays from afar would meet a lone lamp too seldom.
 pub const BRIGHT: f64 = 2.0;
 
 /// One emitting triangle.
@@ -163,8 +164,9 @@ pub struct Luminaires {
 impl Luminaires {
     /// Collects the scene's lights. `exitance` has the exitance of each element per band where it is opaque, as
     /// [`Elements::optics`] gives it.
-    pub fn new(scene: &Scene, mesh: &Mesh, elements: &Elements, area: &[f64], exitance: &[Bands]) -> Luminaires {
-        let total_area: f64 = area.iter().sum();
+    pub fn new(tracer: &Tracer, elements: &Elements, area: &[f64], exitance: &[Bands]) -> Luminaires {
+        let (scene, mesh) = (tracer.scene, tracer.mesh);
+        let total_area = area.iter().sum::<f64>().max(around(mesh.vertices.iter().chain(tracer.eyes())));
         let opacity: Vec<f32> =
             (0..elements.len() as u32).into_par_iter().map(|e| elements.opacity(scene, mesh, e)).collect();
         // What an element emits is seen by rays that it stops and by samples of it alike: its exitance times opacity.
@@ -253,6 +255,14 @@ impl Luminaires {
     }
 }
 
+/// The surface of the box around places, m².
+fn around<'p>(places: impl Iterator<Item = &'p DVec3>) -> f64 {
+    let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = places.fold(nothing, |(low, high), p| (low.min(*p), high.max(*p)));
+    let DVec3 { x, y, z } = (high - low).max(DVec3::ZERO);
+    2.0 * (x * y + y * z + z * x)
+}
+
 fn area_light(name: String, mut pieces: Vec<Piece>) -> Light {
     let tree = (pieces.len() > MOST_EXACT_PIECES).then(|| {
         let power = |piece: &Piece| piece.area * f64::from(luminance(piece.exitance)).max(f64::MIN_POSITIVE);
@@ -279,9 +289,9 @@ fn varied(scene: &Scene, triangle: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::direct::tests::prepared;
-    use glam::DVec3;
-    use radiosity_scene::{Material, Scene};
+    use radiosity_scene::Material;
 
     /// Triangles of one object come front and back in turn: two that make a quadrilateral are one panel all the same.
     #[test]
@@ -296,5 +306,35 @@ mod tests {
         let (_, _, _, luminaires) = prepared(&scene, 10.0);
         let panels: Vec<usize> = luminaires.panels[0].iter().map(|panel| panel.corners.len()).collect();
         assert_eq!(panels, [4, 4]);
+    }
+
+    /// What rays meet everywhere goes through rows; what shines alone, seldom met from afar, does not: two plates far apart, and a lone lamp that is looked at from far away.
+    #[test]
+    fn a_lone_lamp_is_a_light_and_the_walls_of_a_furnace_are_none() {
+        let lamp = Material { emissive: [1000.0; 3], ..Material::default() };
+        let scene = |quads: &[[DVec3; 4]]| {
+            let mut scene = Scene { materials: vec![lamp.clone()], ..Scene::default() };
+            quads.iter().for_each(|corners| drop(scene.add_quad("lamp", 0, *corners)));
+            scene
+        };
+        let square = |origin: DVec3, u: DVec3, v: DVec3| [origin, origin + u, origin + u + v, origin + v];
+        let [x, y, z] = DVec3::AXES;
+        let plates = |gap: f64| scene(&[square(DVec3::ZERO, x, y), square(gap * z, y, x)]);
+        let furnace = scene(&[
+            square(DVec3::ZERO, x, y),
+            square(z, y, x),
+            square(DVec3::ZERO, y, z),
+            square(x, z, y),
+            square(DVec3::ZERO, z, x),
+            square(y, x, z),
+        ]);
+        let lights = |scene: &Scene| prepared(scene, 10.0).3.lights.len();
+        assert_eq!([lights(&furnace), lights(&plates(0.1)), lights(&plates(10.0))], [0, 0, 2]);
+        let alone = scene(&[square(DVec3::ZERO, x, y)]);
+        let (mesh, elements, area, near) = prepared(&alone, 10.0);
+        let tracer = Tracer::new(&alone, &mesh).seen_from(&[20.0 * z]);
+        let exitance = vec![[1000.0; 3]; elements.len()];
+        let far = Luminaires::new(&tracer, &elements, &area, &exitance);
+        assert_eq!([near.lights.len(), far.lights.len()], [0, 1]);
     }
 }

@@ -200,7 +200,7 @@ fn whole(cut: usize) -> Whole {
     let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
     ends(2);
     let exitance: Vec<Bands> = (0..n as u32).map(|e| elements.optics(&scene, &mesh, e).1).collect();
-    let luminaires = Luminaires::new(&scene, &mesh, &elements, &area, &exitance);
+    let luminaires = Luminaires::new(&tracer, &elements, &area, &exitance);
     assert_eq!(luminaires.lights.len(), 1, "the lamp is a light of its own");
     let columns = luminaires.columns(&tracer, &receivers, &Shadowing { places: 2, rays: 8 }, &()).unwrap();
     ends(3);

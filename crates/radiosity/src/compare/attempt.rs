@@ -149,7 +149,7 @@ fn by_rays(
     table.extend(tracer, (&ids, &[]), &receivers, rays, progress)?;
 
     // Lamps without area are known to all contenders; here it is about surfaces.
-    let mut luminaires = Luminaires::new(scene, mesh, elements, area, &problem.exitance);
+    let mut luminaires = Luminaires::new(tracer, elements, area, &problem.exitance);
     luminaires.lights.retain(|light| matches!(light, Light::Area { .. }));
     let places = (SHADOWING.places as usize * rays / DEFAULT_RAYS).max(2) as u32;
     let columns = luminaires.columns(tracer, &receivers, &Shadowing { places, ..SHADOWING }, &())?;

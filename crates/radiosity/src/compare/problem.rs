@@ -130,7 +130,7 @@ impl<'a> Problem<'a> {
         let receivers = Whole::new(mesh, elements, &exposure);
         if !scene.lights.is_empty() {
             // Told of no emission, it takes the lamps alone.
-            let lamps = Luminaires::new(scene, mesh, elements, area, &vec![[0.0; 3]; elements.len()]);
+            let lamps = Luminaires::new(tracer, elements, area, &vec![[0.0; 3]; elements.len()]);
             let columns = lamps.columns(tracer, &receivers, &SHADOWING, &Watch(monitor))?;
             direct = (0..elements.len()).map(|i| columns.mean(i)).collect();
         }

@@ -19,8 +19,8 @@ fn black(luminance: f32) -> Material {
     Material { base_color: [0.0, 0.0, 0.0, 1.0], emissive: [luminance; 3], ..Material::default() }
 }
 
-/// A floor under a lamp of 1000 cd/m² that faces down. With a glow that faces away and is as bright, the lamp is no
-/// brighter than the scene's mean and goes through the rows.
+/// A floor under a lamp of 1000 cd/m² that faces down. With so much that faces away and is as bright, the lamp is not much
+/// brighter than what is around all on average and goes through the rows.
 fn lamp_over_floor(alpha: f32, alpha_mode: AlphaMode, glow: bool) -> Scene {
     let lamp = Material { base_color: [0.0, 0.0, 0.0, alpha], alpha_mode, ..black(1000.0) };
     let materials = vec![black(0.0), lamp, black(1000.0)];
@@ -28,7 +28,9 @@ fn lamp_over_floor(alpha: f32, alpha_mode: AlphaMode, glow: bool) -> Scene {
     scene.add_quad("floor", 0, square(1.0, 0.0, true));
     scene.add_quad("lamp", 1, square(0.5, 1.0, false));
     if glow {
-        scene.add_quad("glow", 2, square(2.0, 3.0, true));
+        for z in [3.0, 3.1, 3.2, 3.3] {
+            scene.add_quad("glow", 2, square(2.0, z, true));
+        }
     }
     scene
 }

@@ -32,7 +32,7 @@ pub(crate) fn prepared(scene: &Scene, size: f64) -> (Mesh, Elements, Vec<f64>, L
     let elements = Elements::new(scene, &mesh, size);
     let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
     let exitance: Vec<Bands> = (0..elements.len() as u32).map(|e| elements.optics(scene, &mesh, e).1).collect();
-    let luminaires = Luminaires::new(scene, &mesh, &elements, &area, &exitance);
+    let luminaires = Luminaires::new(&Tracer::new(scene, &mesh), &elements, &area, &exitance);
     (mesh, elements, area, luminaires)
 }
 
