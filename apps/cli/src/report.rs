@@ -196,7 +196,9 @@ impl ErrorReport {
         }
         if self.mean_illuminance == 0.0 && self.estimated == 0.0 {
             let places = counted(self.points, "place", "places");
-            return format!("the audit finds no light at any of {places}, and the answer has none");
+            return format!(
+                "no path found light at any of {places}, and the answer has none (what comes through a hole too small for any path to find is missed)"
+            );
         }
         let verdict = match (self.achieved, self.out_of_time) {
             (true, _) => "reached",
@@ -535,7 +537,9 @@ mod tests {
             ErrorReport { dim, ..report(0.01) }.dimly()
         };
         let dimly = |share: f64, upper: f64| dim(share, upper, 0.05);
-        assert!(dim(0.44, 0.2, 0.0).unwrap().ends_with("no more than that it is at most 20.000 %"));
+        assert!(
+            dim(0.44, 0.2, 0.0).unwrap().ends_with("at most 20.000 %; points there, measured by themselves, tell more")
+        );
         let told = dimly(0.44, 0.2).unwrap();
         let begins = "44 % of places have less than 484 lx, a tenth of what this error is relative to";
         assert!(told.starts_with(begins) && told.ends_with("the audit says 10.000 %, at most 20.000 %"), "{told}");

@@ -314,7 +314,9 @@ mod tests {
         let lamp = Material { emissive: [1000.0; 3], ..Material::default() };
         let scene = |quads: &[[DVec3; 4]]| {
             let mut scene = Scene { materials: vec![lamp.clone()], ..Scene::default() };
-            quads.iter().for_each(|corners| drop(scene.add_quad("lamp", 0, *corners)));
+            for corners in quads {
+                scene.add_quad("lamp", 0, *corners);
+            }
             scene
         };
         let square = |origin: DVec3, u: DVec3, v: DVec3| [origin, origin + u, origin + u + v, origin + v];

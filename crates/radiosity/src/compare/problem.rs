@@ -117,7 +117,11 @@ impl<'a> Problem<'a> {
         let emitted = problem.exitance.iter().flatten().map(|e| f64::from(*e));
         problem.emission = emitted.zip(problem.returned(&direct)).map(|(e, returned)| e + returned).collect();
         if problem.emission.iter().all(|e| *e == 0.0) {
-            return Err(Error::Empty("there is no light to compare: no surface emits, and no lamp or sky reaches one"));
+            let what = match direct.iter().all(|d| *d == 0.0) {
+                true => "there is no light to compare: no surface emits, and no lamp or sky reaches one",
+                false => "there is no light to compare: surfaces send none on, as all that is lit is black",
+            };
+            return Err(Error::Empty(what));
         }
         Ok(problem)
     }

@@ -5,7 +5,7 @@ use crate::cornell_box;
 use difference::each_pair;
 use glam::DVec3;
 use problem::Problem;
-use radiosity_scene::{Material, Mesh, Scene};
+use radiosity_scene::{Material, Mesh, PointLight, PointLightKind, Scene};
 use radiosity_transport::{FormFactorMethod, FormFactorOptions, FormFactors};
 
 /// Time that is never over.
@@ -114,7 +114,20 @@ fn what_cannot_be_compared_is_refused() {
     dark.materials.iter_mut().for_each(|material| material.emissive = [0.0; 3]);
     let mesh = Mesh::new(&dark);
     let error = compare(&Tracer::new(&dark, &mesh), &few, &()).unwrap_err();
-    assert!(error.to_string().contains("no light"), "{error}");
+    assert!(error.to_string().contains("no surface emits"), "{error}");
+    let mut black = cornell_box();
+    black.materials.iter_mut().for_each(|m| (m.emissive, m.base_color) = ([0.0; 3], [0.0, 0.0, 0.0, 1.0]));
+    black.lights.push(PointLight {
+        name: String::new(),
+        kind: PointLightKind::Point,
+        position: DVec3::new(0.28, 0.5, 0.28),
+        direction: DVec3::NEG_Y,
+        intensity: [100.0; 3],
+        range: None,
+    });
+    let mesh = Mesh::new(&black);
+    let error = compare(&Tracer::new(&black, &mesh), &few, &()).unwrap_err();
+    assert!(error.to_string().contains("all that is lit is black"), "{error}");
     struct Stop;
     impl Monitor for Stop {
         fn step(&self, _done: usize, _total: usize) -> bool {
