@@ -19,6 +19,7 @@ use radiosity_view::{Audit, Auditor};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// Places at which written light is compared with the solution, for each place of the audit. At a tenth of the cost of a
 /// lightmap they see edges that take up a thousandth of the area.
@@ -56,6 +57,9 @@ pub(crate) enum Written {
     /// Texels have rays by the error asked and their noise ([`crate::texels`]).
     Texels,
 }
+
+/// Part of the time left that is for the first points where finer ones may follow.
+const FIRST: f64 = 0.5;
 
 /// Least part of their rays that points are lit with, and how many times as many rays some are lit with, too, to see how long that takes.
 const LEAST_PART: f64 = 0.125;
@@ -126,8 +130,11 @@ pub(crate) struct Judge<'b, 'a> {
     is_relit: bool,
     /// The part of its rays that a point is lit with: all but where a deadline leaves less time.
     thinned: f64,
-    /// Seconds that a place takes with all rays, where that had to be known.
+    /// Seconds that a place takes with all rays, and with that part of them, where that had to be known.
     each: f64,
+    each_thinned: f64,
+    /// When points as they are lit now are to be done, where there is a deadline and finer ones may follow.
+    until: Option<Instant>,
     /// Whether a deadline left something undone.
     hurried: AtomicBool,
 }
@@ -147,6 +154,8 @@ impl<'b, 'a> Judge<'b, 'a> {
             is_relit: false,
             thinned: 1.0,
             each: 0.0,
+            each_thinned: 0.0,
+            until: None,
             hurried: AtomicBool::new(false),
         }
     }
@@ -162,12 +171,18 @@ impl<'b, 'a> Judge<'b, 'a> {
     }
 
     /// Where there is a deadline, finds with which part of their rays so many points are lit by it, and which part of them there is
-    /// time for where that is the least; time is kept for what comes `after`, relative to it. Places where light is read back are
-    /// timed: they are spread as points are.
+    /// time for where that is the least; time is kept for what comes `after`, relative to it. Where points may become finer
+    /// [`FIRST`] of the time is for those first ones. Places where light is read back are timed: they are spread as points are.
     ///
     /// # Errors
     /// [`Error::Stopped`].
-    pub fn pace(&mut self, points: f64, after: f64, monitor: &dyn Monitor) -> Result<f64, Error> {
+    pub fn pace(
+        &mut self,
+        points: f64,
+        after: f64,
+        may_be_finer: bool,
+        monitor: &dyn Monitor,
+    ) -> Result<f64, Error> {
         if pace::left(monitor).is_none() || self.more.is_empty() {
             return Ok(1.0);
         }
@@ -183,15 +198,22 @@ impl<'b, 'a> Judge<'b, 'a> {
         let cost = Cost::new(times, parts * points / self.more.len() as f64);
         self.each = cost.seconds(1.0) / points.max(1.0);
         let left = (pace::left(monitor).unwrap_or(0.0) - self.baked.audit_seconds()).max(0.0) / (1.0 + after);
-        self.thinned = cost.rays(left, [least, 1.0]);
+        let first = if may_be_finer { FIRST } else { 1.0 };
+        self.thinned = cost.rays(first * left, [least, 1.0]);
+        self.each_thinned = cost.seconds(self.thinned) / points.max(1.0);
         self.or_hurried(self.thinned >= 1.0);
         Ok(cost.part(left, self.thinned))
     }
 
-    /// Whether there is time to light so many points once more, with all their rays, and for what comes with it.
+    /// Points are lit from now on, after which finer ones may follow: where there is a deadline, [`FIRST`] of the time left is for them.
+    pub fn begin(&mut self, monitor: &dyn Monitor) {
+        self.until = pace::left(monitor).map(|left| Instant::now() + Duration::from_secs_f64(FIRST * left));
+    }
+
+    /// Whether there is time to light so many points once more, and for what comes with it.
     pub fn has_time(&self, points: f64, after: f64, monitor: &dyn Monitor) -> bool {
-        let seconds = (1.0 + after) * points * self.each + 2.0 * self.baked.audit_seconds();
-        self.or_hurried(self.thinned >= 1.0 && has_time(monitor, seconds))
+        let seconds = (1.0 + after) * points * self.each_thinned + 2.0 * self.baked.audit_seconds();
+        self.or_hurried(has_time(monitor, seconds))
     }
 
     /// Whether a deadline left something undone.
@@ -211,7 +233,9 @@ impl<'b, 'a> Judge<'b, 'a> {
         // Few rays are not for nothing: a point takes an eighth of what it takes alone, at least.
         let share = (1.0 / f64::from(of)).max(0.125);
         let seconds = self.each * (points as f64 * share + after as f64 * self.thinned.max(0.125));
-        self.or_hurried(has_time(monitor, seconds + self.baked.audit_seconds()))
+        let end = Instant::now() + Duration::from_secs_f64(seconds);
+        let is_in_time = self.until.is_none_or(|until| end <= until);
+        self.or_hurried(is_in_time && has_time(monitor, seconds + self.baked.audit_seconds()))
     }
 
     /// Every place at which light will be read back.
@@ -328,7 +352,11 @@ impl<'b, 'a> Judge<'b, 'a> {
         let square = |x: f64| x * x;
         let enough = OWN_SHARE.sqrt() * reachable;
         let at = std::mem::take(&mut self.at);
-        let before = self.certify(&at, enough, monitor)?;
+        // Where there is a deadline, points need the time more than what is known of the solution does.
+        let before = match pace::left(monitor) {
+            Some(_) => self.auditor.judge(&at),
+            None => self.certify(&at, enough, monitor)?,
+        };
         self.at = at;
         let relight = self.baked.achieved && self.look_closer(before.upper, enough, monitor)?;
         let solution = self.auditor.judge(&self.at);

@@ -139,7 +139,7 @@ pub fn lightmap(
     let budget = automatic_texels(canvas.charts.len()).min(most);
     let mut judge = Judge::new(baked, Written::Texels);
     // Where there is no time for that many with the fewest rays, there are fewer.
-    let part = if texels_per_metre.is_none() { judge.pace(budget, EDGES, monitor)? } else { 1.0 };
+    let part = if texels_per_metre.is_none() { judge.pace(budget, EDGES, true, monitor)? } else { 1.0 };
     params.texels_per_metre = texels_per_metre
         .or_else(|| canvas.charts.density_for(budget * part.max(LEAST_TEXELS)))
         .unwrap_or(params.texels_per_metre);
@@ -148,7 +148,11 @@ pub fn lightmap(
         return Err(Error::Lightmap(LightmapError::Texels { texels, most }));
     }
     if texels_per_metre.is_some() {
-        judge.pace(texels, EDGES, monitor)?;
+        judge.pace(texels, EDGES, false, monitor)?;
+    }
+    let may_be_finer = texels_per_metre.is_none();
+    if may_be_finer {
+        judge.begin(monitor);
     }
     let mut last = attempt(&canvas, &params, &mut judge, None, monitor)?;
     let mut rounds = vec![last.drawn.round(&last.audit)];
@@ -158,7 +162,7 @@ pub fn lightmap(
     // Finer texels while the map misses what the solution has and the texels that are needed can be had.
     let tolerance = judge.reachable() * root_mean_square(&baked.solution);
     let mut needed = None;
-    while texels_per_metre.is_none()
+    while may_be_finer
         && rounds.len() <= ROUNDS
         && !is_stalled(&rounds)
         && !is_over(monitor)
@@ -180,6 +184,7 @@ pub fn lightmap(
         monitor.note(&rounds[rounds.len() - 1].to_string());
         canvas.charts.finer = step.finer;
         let known = (!goal.relight).then_some((&last.drawn, &detail));
+        judge.begin(monitor);
         let next = attempt(&canvas, &params, &mut judge, known, monitor)?;
         rounds.push(next.drawn.round(&next.audit));
         let before = std::mem::replace(&mut last, next);

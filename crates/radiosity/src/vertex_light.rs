@@ -52,7 +52,7 @@ pub fn vertex_light(baked: &Baked, monitor: &dyn Monitor) -> Result<VertexLight,
         (0..solution.tracer().mesh.triangles.len()).map(|t| solution.elements.division(t)).collect();
     let mut known = HashMap::new();
     let mut lattice = Lattice::new(solution, &faces, &division, &judge);
-    judge.pace(lattice.at.len() as f64, 0.0, monitor)?;
+    judge.pace(lattice.at.len() as f64, 0.0, true, monitor)?;
     let mut lit = lattice.light(solution, &judge, &mut known, monitor)?;
     let mut audit = judge.audit(monitor, |station| lattice.read(station))?;
     let mut rounds = vec![lattice.round(lit, &audit)];
