@@ -176,7 +176,7 @@ impl ErrorReport {
             }
             upper if upper.is_finite() => {
                 format!(
-                    "there the audit knows no more than that it is at most {}; points there, measured by themselves, tell more",
+                    "there the audit knows no more than that it is at most {}; points there, by themselves, may tell more",
                     percent(upper)
                 )
             }
@@ -537,9 +537,7 @@ mod tests {
             ErrorReport { dim, ..report(0.01) }.dimly()
         };
         let dimly = |share: f64, upper: f64| dim(share, upper, 0.05);
-        assert!(
-            dim(0.44, 0.2, 0.0).unwrap().ends_with("at most 20.000 %; points there, measured by themselves, tell more")
-        );
+        assert!(dim(0.44, 0.2, 0.0).unwrap().ends_with("at most 20.000 %; points there, by themselves, may tell more"));
         let told = dimly(0.44, 0.2).unwrap();
         let begins = "44 % of places have less than 484 lx, a tenth of what this error is relative to";
         assert!(told.starts_with(begins) && told.ends_with("the audit says 10.000 %, at most 20.000 %"), "{told}");

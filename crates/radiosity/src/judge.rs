@@ -176,13 +176,7 @@ impl<'b, 'a> Judge<'b, 'a> {
     ///
     /// # Errors
     /// [`Error::Stopped`].
-    pub fn pace(
-        &mut self,
-        points: f64,
-        after: f64,
-        may_be_finer: bool,
-        monitor: &dyn Monitor,
-    ) -> Result<f64, Error> {
+    pub fn pace(&mut self, points: f64, after: f64, may_be_finer: bool, monitor: &dyn Monitor) -> Result<f64, Error> {
         if pace::left(monitor).is_none() || self.more.is_empty() {
             return Ok(1.0);
         }

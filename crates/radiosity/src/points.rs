@@ -1,7 +1,7 @@
 //! Light of points and of elements: a few rays for each, then more for those whose first ones disagree ([`crate::allocation`]). All
 //! that were sent count, until another solution takes the place of the one that they looked up.
 
-use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, curb, growth};
+use crate::allocation::{DIRECT_POWER, Found, GATHERED_POWER, Lit, curb, growth};
 use crate::answer::Places;
 use crate::{Error, Monitor, Solution};
 use glam::DVec3;
@@ -208,8 +208,8 @@ impl<A: Asked> Light<A> {
         })?;
         let mut times = growth(&spread(&self.pooled), &weights, &ceilings, of_gathered, for_gathered);
         curb(&mut times, &self.gathered.rays, most);
-        let more_gathered = self.gathered.grow_by_halves((&times, for_gathered), |own, rays| {
-            solution.halves_of(&asked.some(solution, own, set), rays as usize, monitor)
+        let more_gathered = self.gathered.grow((&times, for_gathered), |own, rays| {
+            Ok(Lit::of_halves(&solution.halves_of(&asked.some(solution, own, set), rays as usize, monitor)?))
         })?;
         self.share();
         self.seconds += began.elapsed().as_secs_f64();

@@ -87,32 +87,35 @@ pub(crate) fn light(
         let (light, apart): (Vec<Bands>, Vec<f32>) = shared.iter().map(|p| (p.light, p.noise)).unzip();
         let beside = Neighbours(sheet.atlas.beside(sheet.page, sheet.texels));
         let light = beside.by_scales(&light, &apart, None, &GATHERED);
-        shared.iter_mut().zip(light).for_each(|(shared, light)| shared.light = light);
+        let is_finite = |shared: &Pooled| shared.light.iter().all(|e| e.is_finite());
+        let finite = shared.iter_mut().zip(light).filter(|(shared, _)| is_finite(shared));
+        finite.for_each(|(shared, light)| shared.light = light);
         shared
     };
-    let shared = |rays: usize| -> Result<(Option<Found>, Vec<Pooled>), Error> {
+    let gathered = |rays: usize| -> Result<Option<Found>, Error> {
         if !gathers {
-            let told = |s: &Station| baked.field.at(s.place.triangle as usize, s.uv, s.side);
-            let alone = |s: &Station| Pooled { light: told(s), own: 1.0, noise: 0.0, spread: 0.0 };
-            return Ok((None, at.iter().map(alone).collect()));
+            return Ok(None);
         }
         let halves = solution.halves_at(&places, rays, 0, monitor)?;
-        let gathered = Found::of_halves(&halves, rays as u32, evened);
-        let indirect = pooled(&gathered);
-        Ok((Some(gathered), indirect))
+        Ok(Some(Found::of_halves(&halves, rays as u32, evened)))
+    };
+    let of_field = || {
+        let told = |s: &Station| baked.field.at(s.place.triangle as usize, s.uv, s.side);
+        at.iter().map(|s| Pooled { light: told(s), own: 1.0, noise: 0.0, spread: 0.0 }).collect()
     };
     if thinned < 1.0 {
         let [gather, shadow] = usual_rays(error).map(|rays| thin(rays, thinned));
         let direct = solution.direct_at(&places, &shadowing(shadow), monitor)?;
-        let (gathered, indirect) = shared(gather)?;
-        return Ok(TexelLight { direct, indirect: gathered.map_or(indirect, |gathered| believed(&gathered)) });
+        let indirect = gathered(gather)?.as_ref().map_or_else(of_field, believed);
+        return Ok(TexelLight { direct, indirect });
     }
 
     let first = gather_rays(error).min(FIRST_GATHERED);
     let shadow = rays_for(error, FIRST_SHADOW, LEAST_SHADOW, MOST_SHADOW);
     let halves = solution.direct_halves_of(&solution.places(places.clone(), 1), &shadowing(shadow / 2), monitor)?;
     let mut direct = Found::of_halves(&halves, shadow as u32, evened);
-    let (mut gathered, mut indirect) = shared(first)?;
+    let mut gathered = gathered(first)?;
+    let mut indirect = gathered.as_ref().map_or_else(of_field, pooled);
     let mut area = sheet.atlas.areas(sheet.texels);
     area.iter_mut().zip(&places).for_each(|(area, place)| *area *= solution.counts(place.triangle as usize));
     let size = root_mean_square(solution);
@@ -199,5 +202,9 @@ mod tests {
         let believed = light(&baked, sheet, &at, (true, 0.5), &()).unwrap().indirect;
         let [shared, believed] = [shared, believed].map(|pooled| off(&|i| pooled[i].light));
         assert!(believed < 0.75 * shared, "{believed} and {shared}");
+        // Those that had more rays by their noise, too.
+        let grown = light(&baked, sheet, &at, (true, 1.0), &()).unwrap().indirect;
+        let grown = off(&|i| grown[i].light);
+        assert!(grown < 0.11, "{grown}");
     }
 }

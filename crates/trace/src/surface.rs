@@ -470,35 +470,49 @@ fn join(kind: &mut [Kind], mesh: &Mesh, flat: f64) {
 fn sheets(kind: &[Kind], mesh: &Mesh, flat: f64) -> Vec<u32> {
     const NONE: u32 = u32::MAX;
     let mut beside = vec![[NONE; 3]; kind.len()];
-    // Where more than two meet they may lie on each other, and each takes its part of the light.
+    // Those that lie on each other, or more than two, take their part of the light each.
     for sides in mesh.sides_of_edges().chunk_by(|a, b| a.edge == b.edge) {
         if let [one, other] = sides.iter().map(EdgeSide::place).collect::<SmallVec<[(usize, usize); 4]>>()[..]
             && kind[one.0].see_through
             && kind[other.0].see_through
+            && goes_on(mesh, one, other)
         {
             beside[one.0][one.1] = other.0 as u32;
             beside[other.0][other.1] = one.0 as u32;
         }
     }
-    let mut first: Vec<u32> = vec![NONE; kind.len()];
+    let mut first: Vec<u32> = (0..kind.len() as u32).collect();
+    let mut is_known: Vec<bool> = kind.iter().map(|kind| !kind.see_through).collect();
+    let mut left = Vec::new();
     for triangle in 0..kind.len() {
-        if first[triangle] != NONE {
+        let (corner, up) = (mesh.corners(triangle)[0], mesh.normal(triangle));
+        // What is too thin to face anywhere lies on no plane.
+        if is_known[triangle] || up == DVec3::ZERO {
             continue;
         }
-        let (corner, up) = (mesh.corners(triangle)[0], mesh.normal(triangle));
         let lies_on = |p: &DVec3| (*p - corner).dot(up).abs() <= flat;
-        first[triangle] = triangle as u32;
-        let mut left = vec![triangle];
+        is_known[triangle] = true;
+        left.push(triangle);
         while let Some(own) = left.pop() {
             for other in beside[own].into_iter().filter(|other| *other != NONE) {
-                if first[other as usize] == NONE && mesh.corners(other as usize).iter().all(lies_on) {
-                    first[other as usize] = triangle as u32;
-                    left.push(other as usize);
+                let other = other as usize;
+                if !is_known[other] && mesh.corners(other).iter().all(lies_on) {
+                    (is_known[other], first[other]) = (true, triangle as u32);
+                    left.push(other);
                 }
             }
         }
     }
     first
+}
+
+/// Whether two triangles lie on opposite sides of an edge, which begins at these corners of them.
+fn goes_on(mesh: &Mesh, (one, at): (usize, usize), (other, of_other): (usize, usize)) -> bool {
+    let (corners, others) = (mesh.corners(one), mesh.corners(other));
+    let [from, to, third] = [0, 1, 2].map(|k| corners[(at + k) % 3]);
+    let along = to - from;
+    let across = |p: DVec3| (p - from) - (p - from).dot(along) / along.length_squared() * along;
+    across(third).dot(across(others[(of_other + 2) % 3])) < 0.0
 }
 
 /// A triangle's doubled area, and the lengths of the edges opposite its corners.
@@ -560,7 +574,9 @@ mod tests {
             double_sided: true,
             ..Material::default()
         };
-        for (heights, passes) in [(&[1.0][..], 0.6), (&[1.0, 1.5], 0.36)] {
+        for (heights, is_doubled, passes) in
+            [(&[1.0][..], false, 0.6), (&[1.0, 1.5], false, 0.36), (&[1.0], true, 0.36)]
+        {
             let mut scene = Scene { materials: vec![pane(0.4)], ..Scene::default() };
             for z in heights {
                 for (x, y) in [(0., 0.), (1., 0.), (0., 1.), (1., 1.)] {
@@ -568,9 +584,16 @@ mod tests {
                     scene.add_quad("pane", 0, corners.map(DVec3::from));
                 }
             }
+            // A copy that faces the other way, in two triangles with the other diagonal.
+            if is_doubled {
+                let corners = [[2., 0., 1.], [0., 0., 1.], [0., 2., 1.], [2., 2., 1.]];
+                scene.add_quad("copy", 0, corners.map(DVec3::from));
+            }
             let mesh = Mesh::new(&scene);
             let tracer = Tracer::new(&scene, &mesh);
-            for (x, y) in [(0.5, 0.5), (0.3, 0.3), (1.0, 0.4), (0.7, 1.0), (1.0, 1.0), (0.6, 0.2)] {
+            // The edges of a copy are others.
+            let places = [(0.6, 0.2), (0.5, 0.5), (0.3, 0.3), (1.0, 0.4), (0.7, 1.0), (1.0, 1.0)];
+            for (x, y) in places.into_iter().take(if is_doubled { 1 } else { 6 }) {
                 let from = Place { point: DVec3::new(x, y, 0.0), normal: DVec3::Z, triangle: u32::MAX };
                 let ray = tracer.ray(&from, DVec3::Z, f64::INFINITY);
                 let free = |i: &u32| !tracer.blocked(&ray, hash(*i));

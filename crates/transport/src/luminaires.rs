@@ -10,8 +10,8 @@ use smallvec::SmallVec;
 use std::ops::Range;
 
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
-/// nothing extra: its noise there is no more than that of ordinary reflected light. What is missing of a surface around all
-/// counts as one that gives nothing: rays from afar would meet a lone lamp too seldom.
+/// nothing extra: its noise there is no more than that of ordinary reflected light. The mean is over all surfaces, or over
+/// half of the box around these and all eyes where that is more: rays from afar would meet a lone lamp too seldom.
 pub const BRIGHT: f64 = 2.0;
 
 /// One emitting triangle.
@@ -166,7 +166,7 @@ impl Luminaires {
     /// [`Elements::optics`] gives it.
     pub fn new(tracer: &Tracer, elements: &Elements, area: &[f64], exitance: &[Bands]) -> Luminaires {
         let (scene, mesh) = (tracer.scene, tracer.mesh);
-        let total_area = area.iter().sum::<f64>().max(around(mesh.vertices.iter().chain(tracer.eyes())));
+        let total_area = area.iter().sum::<f64>().max(0.5 * around(mesh.vertices.iter().chain(tracer.eyes())));
         let opacity: Vec<f32> =
             (0..elements.len() as u32).into_par_iter().map(|e| elements.opacity(scene, mesh, e)).collect();
         // What an element emits is seen by rays that it stops and by samples of it alike: its exitance times opacity.
@@ -291,6 +291,7 @@ fn varied(scene: &Scene, triangle: usize) -> bool {
 mod tests {
     use super::*;
     use crate::direct::tests::prepared;
+    use glam::DQuat;
     use radiosity_scene::Material;
 
     /// Triangles of one object come front and back in turn: two that make a quadrilateral are one panel all the same.
@@ -330,7 +331,12 @@ mod tests {
             square(DVec3::ZERO, z, x),
             square(y, x, z),
         ]);
+        let turned = |scene: &Scene| {
+            let turn = DQuat::from_rotation_arc(DVec3::ONE.normalize(), z);
+            Scene { positions: scene.positions.iter().map(|p| turn * *p).collect(), ..scene.clone() }
+        };
         let lights = |scene: &Scene| prepared(scene, 10.0).3.lights.len();
+        assert_eq!(lights(&turned(&furnace)), 0);
         assert_eq!([lights(&furnace), lights(&plates(0.1)), lights(&plates(10.0))], [0, 0, 2]);
         let alone = scene(&[square(DVec3::ZERO, x, y)]);
         let (mesh, elements, area, near) = prepared(&alone, 10.0);

@@ -121,7 +121,7 @@ pub fn mean_exitance(live: &Live) -> f64 {
     power / area.max(f64::MIN_POSITIVE)
 }
 
-/// Whether an object shines so brightly beside a mean that shadow rays go to it: as luminaires of batch work, by the
+/// Whether an object shines so brightly beside a mean over what there is that shadow rays go to it, by the
 /// brightest of its triangles; and what rows would not get right, emission that varies within triangles.
 pub fn is_direct(shape: &Shape, mean_exitance: f64) -> bool {
     let peak = shape.exitance.iter().map(|e| luminance(*e)).fold(0f32, f32::max);

@@ -8,16 +8,16 @@
 //!
 //! Not every contact cuts. What is shorter than an element cannot part rooms: the legs of a table leave the floor as it is
 //! ([`LEAST_RUN`], [`WALL`]). Only two cut at any length: the edge where a sheet ends, for a hut of sheets in a wide landscape is smaller
-//! than an element; and a sheet before the sky, as the lining of a roof, whatever goes through it from side to side, for beams
-//! are as bright as day outside. And a triangle that is lit on one side of its contacts only, as where a pillow sinks into a
-//! couch, has nothing to be parted from: what of it is buried is left out of its elements anyway.
+//! than an element; and under the sky a sheet that does not face up, as the lining of a roof, whatever goes through it from side to
+//! side, for beams are as bright as day outside. And a triangle that is lit on one side of its contacts only, as where a pillow sinks
+//! into a couch, has nothing to be parted from: what of it is buried is left out of its elements anyway.
 
 use super::boxes::Boxes;
 use super::cut::Cutter;
 use super::edges::{is_balanced, ordered};
 use super::weld::Weld;
 use super::{CREASE, Mesh, STANDING, Union, WHOLE};
-use crate::{AlphaMode, Scene};
+use crate::{AlphaMode, PointLightKind, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -55,6 +55,9 @@ const LEAST_CONTACTS: usize = 1 << 16;
 /// Boxes whose contacts are searched for at the same time: enough work for many threads, and little to repeat.
 const AT_ONCE: usize = 4096;
 
+/// What faces up by more than this has ground behind it and no sky: grass, posts and legs end there.
+const FACES_UP: f64 = 0.1;
+
 /// Pairs of contacts on one triangle that are compared; where there are more it is cut.
 const MOST_COMPARED: usize = 1 << 12;
 
@@ -72,8 +75,9 @@ struct Contact {
     host: u32,
     other: u32,
     line: Line,
-    /// Whether it goes from one side of the host to another, so that the host goes through the other, on whose back may be
-    /// the sky.
+    /// How many of its ends lie on sides of the host, where it crosses a sheet that may have the sky behind it: of all contacts with the sheet
+    /// two do if the host goes through.
+    at_sides: u8,
     is_through: bool,
 }
 
@@ -91,12 +95,9 @@ impl Mesh {
         let area = self.whole_area();
         let (mut list, found_all) = self.contacts(scene);
         let run = LEAST_RUN * (2.0 * area / ELEMENTS).sqrt();
-        let needs_ends = |contact: &Contact| contact.is_through || matches!(contact.line, Line::Edge(..));
+        let needs_ends = |contact: &Contact| contact.at_sides > 0 || matches!(contact.line, Line::Edge(..));
         let ends = if list.iter().any(needs_ends) { self.ends_of_surfaces() } else { Vec::new() };
-        if list.iter().any(|contact| contact.is_through) {
-            let is_open = self.open_parts(&ends);
-            list.iter_mut().for_each(|contact| contact.is_through &= is_open[contact.other as usize]);
-        }
+        self.find_through(&mut list, &ends);
         self.keep_long(&mut list, run.min(WALL), &ends);
         list.sort_by_key(|contact| contact.host);
 
@@ -104,14 +105,13 @@ impl Mesh {
         // only where both have their vertices on it.
         let parted: Vec<u32> = list
             .chunk_by(|a, b| a.host == b.host)
-            .filter(|contacts| {
-                contacts.iter().any(|contact| contact.is_through) || self.parts(scene, contacts, run > WALL)
-            })
+            .filter(|contacts| self.parts(scene, contacts, run > WALL))
             .map(|contacts| contacts[0].host)
             .collect();
         let is_parted = |t: u32| parted.binary_search(&t).is_ok();
         list.retain(|contact| {
-            is_parted(contact.host) || (matches!(contact.line, Line::Crossing(_)) && is_parted(contact.other))
+            let cuts_back = matches!(contact.line, Line::Crossing(_)) && is_parted(contact.other);
+            contact.is_through || is_parted(contact.host) || cuts_back
         });
 
         // Cut them, each triangle in its place.
@@ -275,17 +275,33 @@ impl Mesh {
         open.map(|faces| faces[0].edge).collect()
     }
 
-    /// Whether the part of the mesh that each triangle belongs to ends somewhere, at one of these edges.
-    fn open_parts(&self, ends: &[(u32, u32)]) -> Vec<bool> {
+    /// Finds the contacts with sheets that their hosts go through. A sheet is a part of the mesh that ends somewhere, at one of
+    /// these `ends`.
+    fn find_through(&self, list: &mut [Contact], ends: &[(u32, u32)]) {
+        if list.iter().all(|contact| contact.at_sides == 0) {
+            return;
+        }
         let mut parts = Union::new(self.vertices.len());
         for [a, b, c] in &self.triangles {
             parts.join(*a as usize, *b as usize);
             parts.join(*a as usize, *c as usize);
         }
         let parts = parts.names();
-        let mut is_open = vec![false; self.vertices.len()];
-        ends.iter().for_each(|(end, _)| is_open[parts[*end as usize] as usize] = true);
-        self.triangles.iter().map(|[corner, ..]| is_open[parts[*corner as usize] as usize]).collect()
+        let mut is_sheet = vec![false; self.vertices.len()];
+        ends.iter().for_each(|(end, _)| is_sheet[parts[*end as usize] as usize] = true);
+        let place = |contact: &Contact| (contact.host, parts[self.triangles[contact.other as usize][0] as usize]);
+        let of_sheet = |n: &u32| list[*n as usize].at_sides > 0 && is_sheet[place(&list[*n as usize]).1 as usize];
+        let mut met: Vec<u32> = (0..list.len() as u32).filter(of_sheet).collect();
+        met.sort_by_key(|n| place(&list[*n as usize]));
+        let mut through: Vec<(u32, u32)> = Vec::new();
+        for same in met.chunk_by(|a, b| place(&list[*a as usize]) == place(&list[*b as usize])) {
+            if same.iter().map(|n| list[*n as usize].at_sides).fold(0, u8::saturating_add) > 1 {
+                through.push(place(&list[same[0] as usize]));
+            }
+        }
+        for contact in list {
+            contact.is_through = through.binary_search(&place(contact)).is_ok();
+        }
     }
 
     /// Puts pieces in the place of triangles, which come in ascending order.
@@ -344,6 +360,18 @@ impl Mesh {
             lit && wide && material(pair[1 - host]).alpha_mode == AlphaMode::Opaque
         });
 
+        // Where one goes through the plane of the other, from side to side, and how many of these places lie within a line there.
+        let along = line.normalize();
+        let spans = [0, 1].map(|of| self.crossings(names[of], heights[of], along));
+        let place = |p: &DVec3| p.dot(along);
+        let up = scene.up.direction();
+        let at_sides = |host: usize, [from, to]: [DVec3; 2]| match spans[host] {
+            Some([p, q]) if normals[1 - host].dot(up) <= FACES_UP && is_under_sky(scene) => {
+                u8::from(place(&p) >= place(&from)) + u8::from(place(&q) <= place(&to))
+            }
+            _ => 0,
+        };
+
         // An edge of the one that lies on the other, or else the line in which they cross.
         let edges = heights.map(|h| (0..3).find(|i| h[*i] == 0.0 && h[(i + 1) % 3] == 0.0));
         for (of, edge) in edges.iter().enumerate() {
@@ -351,25 +379,22 @@ impl Mesh {
             let ends = [corners[of][*i], corners[of][(i + 1) % 3]];
             if length_within(ends, corners[1 - of], normals[1 - of], self.tolerance) > 2.0 * self.tolerance {
                 let line = Line::Edge(names[of][*i], names[of][(i + 1) % 3]);
-                list.push(Contact { host: pair[1 - of], other: pair[of], line, is_through: false });
+                let ordered = if place(&ends[0]) <= place(&ends[1]) { ends } else { [ends[1], ends[0]] };
+                let at_sides = at_sides(1 - of, ordered);
+                list.push(Contact { host: pair[1 - of], other: pair[of], line, at_sides, is_through: false });
             }
         }
         if edges != [None, None] || !hosts.contains(&true) {
             return;
         }
-        let along = line.normalize();
-        let spans = [0, 1].map(|of| self.crossings(names[of], heights[of], along));
         let [Some(p), Some(q)] = spans else { return };
-        let place = |p: &DVec3| p.dot(along);
         let from = if place(&p[0]) > place(&q[0]) { p[0] } else { q[0] };
         let to = if place(&p[1]) < place(&q[1]) { p[1] } else { q[1] };
         if place(&to) - place(&from) > 2.0 * self.tolerance {
             let crossed = (0..2).filter(|host| hosts[*host]);
             let contact = |host: usize| {
-                let own = [p, q][host];
-                let is_through =
-                    !scene.sky.is_black() && place(&own[0]) >= place(&from) && place(&own[1]) <= place(&to);
-                Contact { host: pair[host], other: pair[1 - host], line: Line::Crossing([from, to]), is_through }
+                let (line, at_sides) = (Line::Crossing([from, to]), at_sides(host, [from, to]));
+                Contact { host: pair[host], other: pair[1 - host], line, at_sides, is_through: false }
             };
             list.extend(crossed.map(contact));
         }
@@ -423,6 +448,11 @@ impl Mesh {
     }
 }
 
+/// Whether light comes from outside of all surfaces.
+fn is_under_sky(scene: &Scene) -> bool {
+    !scene.sky.is_black() || scene.lights.iter().any(|light| light.kind == PointLightKind::Directional)
+}
+
 /// How much of a line in the plane of a triangle lies on it, or within a margin.
 fn length_within([start, end]: [DVec3; 2], corners: [DVec3; 3], up: DVec3, margin: f64) -> f64 {
     let (mut first, mut last) = (0.0_f64, 1.0_f64);
@@ -443,7 +473,7 @@ fn length_within([start, end]: [DVec3; 2], corners: [DVec3; 3], up: DVec3, margi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Material, Sky};
+    use crate::{Material, Sky, Up};
     use glam::DVec2;
 
     fn scene(quads: &[[[f64; 3]; 4]]) -> Scene {
@@ -457,35 +487,40 @@ mod tests {
 
     const FLOOR: [[f64; 3]; 4] = [[0., 0., 0.], [4., 0., 0.], [4., 3., 0.], [0., 3., 0.]];
 
-    /// A beam, however thin, is cut where it goes through a sheet behind which is the sky, and not where it ends in a solid.
+    /// Thin beams are cut where they go through a ceiling behind which is the sky, on the edges of its triangles too; not by floors, nor where they end in a solid, and ceilings stay whole but for what welding asks.
     #[test]
-    fn beams_are_cut_by_sheets_before_the_sky_and_not_by_solids() {
-        let corner = |low: [f64; 3], high: [f64; 3], k: usize| {
-            [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { high[axis] } else { low[axis] })
+    fn beams_are_cut_by_ceilings_before_the_sky() {
+        let sky = || Sky::Uniform([1.0; 3]);
+        let quads = |n: u32, up: bool| {
+            let at = |i: u32, j: u32| [4.0 * f64::from(i) / f64::from(n), 3.0 * f64::from(j) / f64::from(n), 0.0];
+            let quad = move |i, j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let all = (0..n).flat_map(move |i| (0..n).map(move |j| quad(i, j)));
+            all.map(|[a, b, c, d]| if up { [a, b, c, d] } else { [d, c, b, a] }).collect::<Vec<_>>()
         };
-        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        for (is_solid, low, sky) in
-            [(false, -1.0, Sky::Uniform([1.0; 3])), (false, -1.0, Sky::Black), (true, -0.2, Sky::Uniform([1.0; 3]))]
-        {
-            let is_whole = is_solid || sky.is_black();
-            let mut scene = Scene { materials: vec![Material::default()], sky, ..Scene::default() };
-            for face in faces {
-                scene.add_quad("beam", 0, face.map(|k| DVec3::from(corner([1.0, 1.0, low], [1.03, 1.03, 1.0], k))));
+        let slab = solid([0.0, 0.0, -0.5], [4.0, 3.0, 0.0]).to_vec();
+        for (sheet, low, sky, is_cut) in [
+            (quads(1, false), -1.0, sky(), true),
+            (quads(200, false), -1.0, sky(), true),
+            (quads(1, false), -1.0, Sky::Black, false),
+            (quads(1, true), -1.0, sky(), false),
+            (slab, -0.2, sky(), false),
+        ] {
+            // Beside the diagonal of the ceiling, and across it.
+            for y in [1.0, 0.745] {
+                let beam = solid([1.0, y, low], [1.03, y + 0.03, 1.0]);
+                let mut scene = Scene { sky: sky.clone(), ..solids(&[&beam, &sheet[..]].concat()) };
+                scene.up = Up::Z;
+                let mesh = Mesh::new(&scene);
+                let of_beam = |t: &usize| (mesh.source[*t] as usize) < 2 * beam.len();
+                let goes_through = |t: usize| {
+                    let heights = mesh.corners(t).map(|p| p.z);
+                    heights.iter().any(|z| *z > 1e-3) && heights.iter().any(|z| *z < -1e-3)
+                };
+                let through = (0..mesh.triangles.len()).filter(of_beam).filter(|t| goes_through(*t)).count();
+                assert_eq!(through, if is_cut { 0 } else { 8 }, "{} {low} {y}", sheet.len());
+                let others = (0..mesh.triangles.len()).filter(|t| !of_beam(t)).count();
+                assert!((2 * sheet.len()..2 * sheet.len() + 20).contains(&others), "{others} of {}", sheet.len());
             }
-            match is_solid {
-                true => faces.iter().for_each(|face| {
-                    scene.add_quad("slab", 0, face.map(|k| DVec3::from(corner([0.0, 0.0, -0.5], [4.0, 3.0, 0.0], k))));
-                }),
-                false => drop(scene.add_quad("sheet", 0, FLOOR.map(DVec3::from))),
-            }
-            let mesh = Mesh::new(&scene);
-            let goes_through = |t: usize| {
-                let heights = mesh.corners(t).map(|p| p.z);
-                scene.triangle_object[mesh.source[t] as usize] == 0
-                    && heights.iter().any(|z| *z > 1e-3)
-                    && heights.iter().any(|z| *z < -1e-3)
-            };
-            assert_eq!((0..mesh.triangles.len()).any(goes_through), is_whole);
         }
     }
 
