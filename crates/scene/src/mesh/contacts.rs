@@ -8,8 +8,8 @@
 //!
 //! Not every contact cuts. What is shorter than an element cannot part rooms: the legs of a table leave the floor as it is
 //! ([`LEAST_RUN`], [`WALL`]). Only two cut at any length: the edge where a sheet ends, for a hut of sheets in a wide landscape is smaller
-//! than an element; and under the sky a sheet that does not face up, as the lining of a roof, whatever goes through it from side to
-//! side, for beams are as bright as day outside. And a triangle that is lit on one side of its contacts only, as where a pillow sinks
+//! than an element; and under the sky or the sun a sheet that does not face up, as the lining of a roof, and whatever goes through it from
+//! side to side, for beams are as bright as day outside. And a triangle that is lit on one side of its contacts only, as where a pillow sinks
 //! into a couch, has nothing to be parted from: what of it is buried is left out of its elements anyway.
 
 use super::boxes::Boxes;
@@ -78,6 +78,7 @@ struct Contact {
     /// How many of its ends lie on sides of the host, where it crosses a sheet that may have the sky behind it: of all contacts with the sheet
     /// two do if the host goes through.
     at_sides: u8,
+    /// Whether it does, or is what goes through the host.
     is_through: bool,
 }
 
@@ -290,7 +291,8 @@ impl Mesh {
         let parts = parts.names();
         let mut is_sheet = vec![false; self.vertices.len()];
         ends.iter().for_each(|(end, _)| is_sheet[parts[*end as usize] as usize] = true);
-        let place = |contact: &Contact| (contact.host, parts[self.triangles[contact.other as usize][0] as usize]);
+        let part = |t: u32| parts[self.triangles[t as usize][0] as usize];
+        let place = |contact: &Contact| (contact.host, part(contact.other));
         let of_sheet = |n: &u32| list[*n as usize].at_sides > 0 && is_sheet[place(&list[*n as usize]).1 as usize];
         let mut met: Vec<u32> = (0..list.len() as u32).filter(of_sheet).collect();
         met.sort_by_key(|n| place(&list[*n as usize]));
@@ -302,7 +304,6 @@ impl Mesh {
         }
         // Both are cut there: light breaks only where both have their vertices.
         let is_through = |place: (u32, u32)| through.binary_search(&place).is_ok();
-        let part = |t: u32| parts[self.triangles[t as usize][0] as usize];
         for contact in list {
             let Contact { host, other, .. } = *contact;
             contact.is_through = is_through((host, part(other))) || is_through((other, part(host)));

@@ -23,6 +23,13 @@ pub type Around = SmallVec<[u32; MOST_AROUND]>;
 /// Charts of fewer texels than this ask those that come before and after them, up to so many texels away: most are parts of one thing.
 const FEW: usize = 9;
 
+/// The slots of a chart in the square around one, that among them.
+fn square_around(slot: u32, [columns, rows]: [u32; 2]) -> impl Iterator<Item = u32> {
+    let near = |x: u32, count: u32| x.saturating_sub(AROUND)..(x + AROUND + 1).min(count);
+    let (across, down) = (near(slot % columns, columns), near(slot / columns, rows));
+    down.flat_map(move |y| across.clone().map(move |x| y * columns + x))
+}
+
 impl Atlas {
     /// Pooled light of `texels` of a page: `values[i]`, lx per band, its standard error `noise[i]`, lx, and its number of rays belong to
     /// `texels[i]`, each named once. What is not finite stays as it is. Noise of one texel must not be that of another: a part that they
@@ -62,11 +69,8 @@ impl Atlas {
             let own = slots.iter().flatten().count();
             let rows = slots.len() as u32 / columns;
             let around = |slot: u32| {
-                let (x, y) = (slot % columns, slot / columns);
-                let near = |x: u32, count: u32| x.saturating_sub(AROUND)..(x + AROUND + 1).min(count);
-                let slots =
-                    near(y, rows).flat_map(|y| near(x, columns).map(move |x| &slots[(y * columns + x) as usize]));
-                mean(&mut slots.flatten().map(|i| square(*i)))
+                let known = square_around(slot, [columns, rows]).filter_map(|slot| slots[slot as usize]);
+                mean(&mut known.map(square))
             };
             let tell = |(slot, i): (usize, &Option<usize>)| i.map(|i| (i, (own >= FEW).then(|| around(slot as u32))));
             slots.iter().enumerate().filter_map(tell).collect()
@@ -89,10 +93,8 @@ impl Atlas {
             }
             let rows = slots.len() as u32 / columns;
             let around = |(slot, own): (u32, usize)| {
-                let (x, y) = (slot % columns, slot / columns);
-                let near = |x: u32, count: u32| x.saturating_sub(AROUND)..(x + AROUND + 1).min(count);
-                let around = near(y, rows).flat_map(|y| near(x, columns).map(move |x| y * columns + x));
-                let others = around.filter(|other| *other != slot).filter_map(|other| slots[other as usize]);
+                let others = square_around(slot, [columns, rows]).filter(|other| *other != slot);
+                let others = others.filter_map(|other| slots[other as usize]);
                 (own, others.map(|other| other as u32).collect())
             };
             (0..).zip(slots).filter_map(|(slot, own)| own.map(|own| (slot, own))).map(around).collect()
