@@ -196,7 +196,7 @@ pub(crate) fn divided(
         return Ok(cells.clone());
     }
     let Optics { area, reflectance, sheets, exitance } = Optics::new(tracer, cells);
-    let luminaires = Luminaires::new(tracer, cells, &area, &exitance);
+    let luminaires = Luminaires::new(tracer, cells, &area, &exitance).with_beams(tracer, cells);
     // Nothing is known yet of what is buried; such places drop out one by one.
     let exposure = Exposure::default();
     let receivers = Cells(ElementReceivers { mesh: tracer.mesh, elements: cells, exposure: &exposure });

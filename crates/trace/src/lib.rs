@@ -6,6 +6,7 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+pub mod beams;
 pub mod brute;
 mod build;
 mod collapse;
@@ -22,6 +23,7 @@ pub mod tree;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 mod walk;
 
+pub use beams::{Beam, Beams};
 pub use brute::{blocked_brute, closest_brute, closest_where_brute};
 pub use emitters::{Emitter, EmitterTree};
 pub use importance::narrowed;

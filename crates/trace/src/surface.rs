@@ -8,12 +8,13 @@
 
 use crate::sampling::{hash, unit};
 use crate::shaft::Shaft;
-use crate::{Hit, Ray, Tree};
+use crate::{Beams, Hit, Ray, Tree};
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{AlphaMode, EdgeSide, Mesh, Scene, Side};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 
 /// Hits are at an edge when they lie within so many offsets of it; distances of what meets there are told apart no better
 /// (backs are set back by two offsets).
@@ -107,6 +108,7 @@ pub struct Tracer<'a> {
     scales: Vec<f32>,
     /// From where light is looked at.
     eyes: Vec<DVec3>,
+    beams: OnceLock<Beams>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -221,6 +223,7 @@ impl<'a> Tracer<'a> {
             edge: (0..mesh.triangles.len()).into_par_iter().map(|t| edge_weight(mesh.corners(t), offset)).collect(),
             scales: Vec::new(),
             eyes: Vec::new(),
+            beams: OnceLock::new(),
         }
     }
 
@@ -229,6 +232,7 @@ impl<'a> Tracer<'a> {
     pub fn seen_from(mut self, eyes: &[DVec3]) -> Tracer<'a> {
         self.scales = crate::importance::scales(&self, eyes);
         self.eyes = eyes.to_vec();
+        self.beams = OnceLock::new();
         self
     }
 
@@ -256,6 +260,11 @@ impl<'a> Tracer<'a> {
             + size_of_val(&*self.edge)
             + size_of_val(&*self.scales)
             + size_of_val(&*self.eyes)
+    }
+
+    /// What lamps without area light through small openings, looked for when it is first asked for.
+    pub fn beams(&self) -> &Beams {
+        self.beams.get_or_init(|| Beams::find(self))
     }
 
     /// The tree of boxes (its coordinates are relative to the scene's centre).

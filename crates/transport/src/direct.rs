@@ -43,6 +43,9 @@ pub struct Shadowing {
 /// without any, −0.50 % with one, −0.43 % with four.
 const OPEN: u32 = 2;
 
+/// Places of a receiver at which light of narrow beams is looked at.
+const BEAM_ENDS: f64 = 16.0;
+
 /// The stream of sample points that these rays use.
 const OPENNESS: u32 = 0x02f0;
 
@@ -71,6 +74,8 @@ enum Asked {
 #[derive(Clone, Copy, Debug, Default)]
 struct Column {
     mean: Bands,
+    /// Of what is seen, what falls on the ends of beams, which are lights themselves.
+    carried: Bands,
     is_shaded: bool,
     is_sampled: bool,
 }
@@ -81,9 +86,10 @@ impl Columns {
         &self.seen[receiver * self.lights..][..self.lights]
     }
 
-    /// What all lights give to what is seen of a receiver from afar.
+    /// What all lights give to what is seen of a receiver from afar, and no light carries on from there.
     pub fn seen(&self, receiver: usize) -> Bands {
-        add_up(self.seen_by_light(receiver))
+        let (all, carried) = (add_up(self.seen_by_light(receiver)), self.all[receiver].carried);
+        std::array::from_fn(|band| (all[band] - carried[band]).max(0.0))
     }
 
     /// What all lights give to a receiver.
@@ -200,7 +206,7 @@ impl Luminaires {
             sums.into_iter().map(|sum| sum.map(|sum| (sum / f64::max(total, f64::MIN_POSITIVE)) as f32)).collect();
         for i in (0..receivers.len()).filter(|i| !is_reached(i)) {
             columns.seen[i * kept..][..kept].copy_from_slice(&means[..kept]);
-            columns.all[i] = Column { mean: means[kept], is_shaded: true, is_sampled: true };
+            columns.all[i] = Column { mean: means[kept], is_shaded: true, is_sampled: true, ..Column::default() };
         }
         columns
     }
@@ -259,15 +265,22 @@ impl Luminaires {
                 let all_open: f64 = open.iter().zip(&weights).map(|(open, weight)| open * weight).sum();
                 for l in 0..lights {
                     let mut sums = [0f64; 6];
-                    for ((visible, open), weight) in lit.chunks_exact(lights).zip(&open).zip(&weights) {
+                    let mut carried = [0f64; 3];
+                    for (((visible, open), weight), place) in lit.chunks_exact(lights).zip(&open).zip(&weights).zip(&at) {
                         for band in 0..3 {
                             sums[band] += weight * visible[l][band];
                             sums[band + 3] += weight * open * visible[l][band];
+                        }
+                        if self.carries_on(tracer, l, place) {
+                            (0..3).for_each(|band| carried[band] += weight * open * visible[l][band]);
                         }
                     }
                     for band in 0..3 {
                         let over_area = sums[band] / f64::max(whole, f64::MIN_POSITIVE);
                         column.mean[band] += over_area as f32;
+                        if all_open > 0.0 {
+                            column.carried[band] += (carried[band] / all_open) as f32;
+                        }
                         if let Some(seen) = seen.get_mut(k * kept + l) {
                             seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
                         }
@@ -342,7 +355,7 @@ impl Luminaires {
         Ok(variation)
     }
 
-    /// One unbiased sample of the irradiance of a place from one light; `parts` is room to work it out.
+    /// One unbiased sample of the irradiance of a place from one light, less what other lights carry on; `parts` is room to work it out.
     pub(crate) fn sample<'l>(
         &'l self,
         light: usize,
@@ -351,6 +364,9 @@ impl Luminaires {
         seed: u32,
         parts: &mut Parts<'l>,
     ) -> [f64; 3] {
+        if self.carries_on(tracer, light, place) {
+            return [0.0; 3];
+        }
         parts.find_one(self, light, place);
         let Some((part, probability)) = parts.pick(unit(hash(seed))) else { return [0.0; 3] };
         let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
@@ -400,7 +416,9 @@ impl Luminaires {
             // Next to a lamp it is however few rays there would be: some such elements may send half of the light.
             is_worth_a_look || !is_smooth(*part) && is_clear(u32::MAX)
         });
-        if told.is_some() {
+        // How light varies is asked of what goes on from elements, not of the ends of beams.
+        let ends = if asked == Asked::Mean { site.beam_ends(tracer, self) } else { Vec::new() };
+        if told.is_some() && ends.is_empty() {
             (*is_whole, *is_told) = (true, true);
             site.cubature(is_smooth, nodes);
         } else {
@@ -408,6 +426,9 @@ impl Luminaires {
                 let [_, _, x, y] = places.point(index);
                 (site.place(x, y), 1.0 / f64::from(count))
             }));
+            if !ends.is_empty() {
+                self.add_ends(tracer, &ends, nodes);
+            }
         }
         for (index, (place, weight)) in (0..).zip(&*nodes) {
             let (place, [offset, ..]) = (*place, places.point(index));
@@ -421,6 +442,25 @@ impl Luminaires {
                 sights.share((light, panel, k), tracer, &place, rays)
             });
             spots.push(Spot { place, weight: *weight, offset, settled, outcome: 0, is_buried: None });
+        }
+    }
+
+    /// Adds places where beams end to those of a receiver, which then stand for the rest of it.
+    fn add_ends(&self, tracer: &Tracer, ends: &[(Place, f64)], nodes: &mut Vec<(Place, f64)>) {
+        nodes.retain(|(place, _)| !self.beams_on(tracer, place.triangle).any(|beam| beam.holds(place)));
+        let lit: f64 = ends.iter().map(|(_, share)| share).sum();
+        let rest = nodes.len() as f64;
+        let share = if nodes.is_empty() { 1.0 } else { lit.min(1.0) };
+        nodes.iter_mut().for_each(|(_, weight)| *weight = (1.0 - share) / rest);
+        // Of cells by what is lit of them, as many places as are to be.
+        let (mut reached, step) = (0.5, BEAM_ENDS / lit);
+        for (place, own) in ends {
+            let before = f64::floor(reached);
+            reached += own * step;
+            let count = reached.floor() - before;
+            if count > 0.0 {
+                nodes.push((*place, count * share / BEAM_ENDS));
+            }
         }
     }
 }

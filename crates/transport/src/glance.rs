@@ -56,6 +56,7 @@ pub(crate) struct Glance<'l> {
     lanes: Vec<Lanes>,
     pieces: Vec<&'l Piece>,
     points: Vec<&'l PointLight>,
+    luminaires: &'l Luminaires,
 }
 
 impl<'l> Glance<'l> {
@@ -81,10 +82,10 @@ impl<'l> Glance<'l> {
             lanes.radius[lane] = piece.corners.iter().map(|c| c.distance(*middle)).fold(0.0, f64::max) as f32;
             lanes.power[lane] = (piece.area * f64::from(luminance(piece.exitance)) / PI) as f32;
         }
-        Some(Glance { origin, lanes, pieces, points })
+        Some(Glance { origin, lanes, pieces, points, luminaires })
     }
 
-    /// Irradiance of a spot, lux per band, by one look at a lamp that u in [0, 1) picks.
+    /// Irradiance of a spot, lux per band, by one look at a lamp that u in [0, 1) picks, less what other lights carry on.
     pub fn irradiance(&self, tracer: &Tracer, spot: &Place, (u, seed): (f32, u32)) -> [f64; 3] {
         let mut weights = [0f32; MOST];
         for (lanes, weights) in self.lanes.iter().zip(weights.chunks_exact_mut(LANES)) {
@@ -116,7 +117,11 @@ impl<'l> Glance<'l> {
         }
         let Some((k, probability)) = picked else { return [0.0; 3] };
         let Some(piece) = self.pieces.get(k) else {
-            let (e, _) = from_point(self.points[k - self.pieces.len()], tracer, spot, 1, seed);
+            let number = k - self.pieces.len();
+            if self.luminaires.is_end(tracer, number, spot) {
+                return [0.0; 3];
+            }
+            let (e, _) = from_point(self.points[number], tracer, spot, 1, seed);
             return e.map(|e| e / probability);
         };
         let uv = [0x7, 0x8].map(|k| f64::from(unit(hash(seed ^ k))));

@@ -9,6 +9,10 @@ use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::ops::Range;
 
+mod beams;
+
+pub use beams::BEAMS;
+
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
 /// nothing extra: its noise there is no more than that of ordinary reflected light. The mean is over all surfaces, or over
 /// half of the box around these and all eyes where that is more: rays from afar would meet a lone lamp too seldom.
@@ -159,6 +163,8 @@ pub struct Luminaires {
     pub promoted: Vec<[f32; 4]>,
     /// Triangles by side whose whole emission is carried by `lights`.
     carried: Vec<[bool; 2]>,
+    /// By beam, whether its end belongs to the last light; empty if there is no such light.
+    beams: Vec<bool>,
 }
 
 impl Luminaires {
@@ -227,6 +233,11 @@ impl Luminaires {
             }
         }
         lights.extend(scene.lights.iter().cloned().map(Light::Point));
+        Luminaires { promoted, carried, ..Luminaires::default() }.with(lights)
+    }
+
+    /// With these lights.
+    fn with(self, lights: Vec<Light>) -> Luminaires {
         let few: Vec<[DVec3; 3]> = lights.iter().flat_map(Light::few).map(|piece| piece.corners).collect();
         let panels = lights.iter().map(|light| {
             let pieces = light.few();
@@ -239,13 +250,14 @@ impl Luminaires {
             _ => 0,
         };
         let many = lights.iter().map(in_trees).sum();
-        Luminaires { lights, few: few.chunks(4).map(Four::new).collect(), many, panels, promoted, carried }
+        Luminaires { lights, few: few.chunks(4).map(Four::new).collect(), many, panels, ..self }
     }
 
     /// Lights that a scene has at most, told by its objects alone.
     pub fn most(scene: &Scene) -> usize {
         let shining = scene.objects.iter().filter(|object| scene.materials[object.material].emits()).count();
-        scene.lights.len() + shining.min(MOST_LAMPS)
+        let beams = usize::from(!scene.lights.is_empty());
+        scene.lights.len() + shining.min(MOST_LAMPS) + beams
     }
 
     /// Whether all emission of a triangle's side reaches receivers through the lights. Its elements may still be dark

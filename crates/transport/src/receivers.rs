@@ -1,6 +1,6 @@
 //! Where light is asked for: elements while the equation is solved, points when an answer is read.
 
-use crate::Exposure;
+use crate::{Exposure, Luminaires};
 use crate::exposure::{is_buried, open_place};
 use crate::gather::near;
 use glam::{DVec2, DVec3};
@@ -90,6 +90,49 @@ impl Site {
         let Site { origin, edges: [along, across], mask, .. } = *self;
         let is_whole = mask == u64::MAX && self.normals.is_none() && self.point().is_none();
         is_whole.then_some([origin, origin + along, origin + across])
+    }
+
+    /// Where beams end on it that are lights: a place in each of their cells that is lit, and the lit part of the site that it stands for. What two
+    /// of them light is told once.
+    pub(crate) fn beam_ends(&self, tracer: &Tracer, luminaires: &Luminaires) -> Vec<(Place, f64)> {
+        if self.point().is_some() {
+            return Vec::new();
+        }
+        let exposed = self.area() * f64::from(self.mask.count_ones()) / 64.0;
+        let beams = luminaires.beams_on(tracer, self.triangle);
+        let mut ends = Vec::new();
+        for (k, beam) in beams.clone().enumerate() {
+            let place = |point| Place { point, normal: self.normal_at(point), triangle: self.triangle };
+            let is_own = |place: &Place| beam.holds(place) && !beams.clone().take(k).any(|other| other.holds(place));
+            for cell in beam.cells().iter().filter(|cell| self.contains(cell.lit)) {
+                let place = place(cell.lit);
+                if is_own(&place) {
+                    ends.push((place, f64::from(cell.share) * beam.area() / exposed));
+                }
+            }
+        }
+        ends
+    }
+
+    /// How far along its edges a point of its plane lies.
+    fn along(&self, point: DVec3) -> [f64; 2] {
+        let ([along, across], from) = (self.edges, point - self.origin);
+        let normal = along.cross(across);
+        let square = normal.length_squared();
+        [from.cross(across).dot(normal) / square, along.cross(from).dot(normal) / square]
+    }
+
+    fn contains(&self, point: DVec3) -> bool {
+        let [u, v] = self.along(point);
+        u >= 0.0 && v >= 0.0 && u + v <= 1.0
+    }
+
+    /// The normal at a point of its plane.
+    fn normal_at(&self, point: DVec3) -> DVec3 {
+        self.normals.map_or(self.normal, |[n, along, across]| {
+            let [u, v] = self.along(point);
+            (n + u * along + v * across).normalize()
+        })
     }
 
     /// Places with weights that add up to one, over which a function has the mean that it has over a whole site: three to each part of it where it is

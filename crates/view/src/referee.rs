@@ -11,12 +11,18 @@
 //! the two places are. Where lamps shine mostly on what is beside them — coves, shades, strips under a ceiling — a band of a thousandth of
 //! the room gives half of its light, and paths that find it by chance alone have hundreds of times the variance; in the Cornell box and
 //! an office they have 1.75 and 1.5 times as much after two thirds of the time.
+//!
+//! Where lamps without area light something through a small opening, the end of the beam is itself a lamp to all that sees it: it is sampled by
+//! area and weighted against the paths that meet it by chance (`beams.rs`).
 
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, Surface, luminance};
 use radiosity_trace::sampling::{Random, Sequence, cosine_direction, frame, shuffled};
 use radiosity_trace::{Emitter, EmitterTree, Found, Place, Tracer};
+use beams::BeamEnds;
 use std::f64::consts::PI;
+
+mod beams;
 
 /// Bounces before the roulette starts.
 const SURE_BOUNCES: usize = 3;
@@ -37,6 +43,7 @@ pub struct Referee<'a> {
     from_lamps: bool,
     /// Number of each triangle side's emitter plus one; zero for none.
     emitter_of: Vec<[u32; 2]>,
+    beams: BeamEnds,
 }
 
 /// One side of a triangle that emits.
@@ -112,7 +119,7 @@ impl<'a> Referee<'a> {
         emitters.iter_mut().for_each(|emitter| emitter.density /= sum);
         ends.iter_mut().for_each(|end| *end /= sum);
         let from_lamps = !emitters.is_empty();
-        Referee { tracer, emitters, tree: EmitterTree::new(&boxes, 1), ends, from_lamps, emitter_of }
+        Referee { tracer, emitters, tree: EmitterTree::new(&boxes, 1), ends, from_lamps, emitter_of, beams: BeamEnds::new(tracer) }
     }
 
     /// Irradiance (lux per band) at a place: the mean of `samples` paths. Different `seed`s are independent.
@@ -238,11 +245,14 @@ impl<'a> Referee<'a> {
         let mut choice = first;
         // What the path came along; light paths find nothing that is seen at once.
         let mut edge = None;
+        // Where it came from, if what it met gave back what fell on that very side.
+        let mut from: Option<Place> = None;
         for bounce in 0.. {
             let [u, v, p, q] = choice;
             let direct = [
                 self.sample_lamps(&place, [p, q], edge, random),
-                self.sample_lights(&place, random),
+                self.sample_lights(&place, from.as_ref(), random),
+                self.beams.sample(self.tracer, &place, random),
                 lit.map_or([0.0; 3], |lit| self.by_way_of(lit, &place, random)),
             ];
             for band in 0..3 {
@@ -282,7 +292,9 @@ impl<'a> Referee<'a> {
             if self.from_lamps {
                 edge = Some(cosine * direction.dot(normal).abs() / (PI * distance * distance));
             }
+            let met = normal;
             let normal = self.returned(at, normal, &mut throughput, random);
+            from = (normal == met).then_some(place);
             let strongest = throughput.iter().fold(0f64, |m, t| m.max(*t));
             if strongest <= 0.0 {
                 break;
@@ -349,18 +361,19 @@ impl<'a> Referee<'a> {
     }
 
     /// Irradiance from the lights without area.
-    fn sample_lights(&self, place: &Place, random: &mut Random) -> [f64; 3] {
+    fn sample_lights(&self, place: &Place, from: Option<&Place>, random: &mut Random) -> [f64; 3] {
         let mut sum = [0f64; 3];
         let lights = &self.tracer.scene.lights;
         let all = lights.len() <= ALL_POINT_LIGHTS;
         let count = if all { lights.len() } else { 1 };
         for i in 0..count {
-            let (light, scale) = if all {
-                (&lights[i], 1.0)
+            let (number, scale) = if all {
+                (i, 1.0)
             } else {
                 let pick = (random.next_unit() * lights.len() as f64) as usize;
-                (&lights[pick.min(lights.len() - 1)], lights.len() as f64)
+                (pick.min(lights.len() - 1), lights.len() as f64)
             };
+            let light = &lights[number];
             let (direction, distance, arriving) = light.arrival(place.point);
             let cosine = direction.dot(place.normal);
             if cosine <= 0.0 || luminance(arriving) <= 0.0 {
@@ -368,8 +381,10 @@ impl<'a> Referee<'a> {
             }
             let length = if distance.is_finite() { distance - self.tracer.offset() } else { f64::INFINITY };
             if length <= 0.0 || !self.tracer.blocked(&self.tracer.ray(place, direction, length), random.next_bits()) {
+                // Where a beam ends, it may have been sampled from where the path came from.
+                let weight = from.map_or(1.0, |from| self.beams.weight(self.tracer, from, place, number as u32));
                 for (sum, e) in sum.iter_mut().zip(arriving) {
-                    *sum += scale * cosine * f64::from(e);
+                    *sum += weight * scale * cosine * f64::from(e);
                 }
             }
         }

@@ -159,7 +159,7 @@ impl<'a> Solution<'a> {
             }
         })?;
         let sheets = sheets.exposed(&exposure);
-        let luminaires = Luminaires::new(tracer, &elements, &area, &exitance);
+        let luminaires = Luminaires::new(tracer, &elements, &area, &exitance).with_beams(tracer, &elements);
         let needed = needed(elements.len(), elements.cells());
         if needed > options.memory {
             return Err(memory_error(tracer, elements.len(), needed, options));

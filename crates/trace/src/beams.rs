@@ -1,0 +1,408 @@
+//! Where beams end: what a lamp without area lights through an opening so small that nobody would look there by chance.
+//!
+//! A sun spot of a hand's breadth on the floor of a hall may be all the light there is in it, and neither shadow rays from all over the floor nor paths
+//! meet it. Its outline is the shadow of edges, so it is looked for past each edge that has nothing of its surfaces on one side as the lamp sees it: a ray
+//! that passes there goes on to where it ends. Where the lamp reaches that place, and about the ray nearly nothing, there is a beam. Its end
+//! is told by cells of a grid on the triangle, as many as reach from one lit cell to the next, which are made larger until they are few.
+//!
+//! What is cut out of a surface by its opacity has no edges, and is not looked for.
+
+use crate::sampling::{Sequence, frame, hash, unit};
+use crate::{Found, Place, Tracer};
+use glam::{DVec2, DVec3};
+use radiosity_scene::{Mesh, PointLight, Side, luminance};
+use rayon::prelude::*;
+use std::collections::{HashMap, VecDeque};
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Rays past edges for all lights, about, and at most for each edge: an opening may be a small part of a long one.
+const PROBES: f64 = (1 << 17) as f64;
+const OF_EDGE: f64 = 64.0;
+
+/// Offsets of ray origins by which such rays pass an edge.
+const PAST: f64 = 16.0;
+
+/// A beam is narrow where of so many places on a disc around it fewer than so many are lit. The disc has this part of the area of all surfaces, at triangles
+/// that are seen from afar.
+const AROUND: u32 = 32;
+const MANY: usize = 2;
+const DISC: f64 = 1.0 / 512.0;
+
+/// Places from which the ends of beams are grown, at most.
+const SEEDS: usize = 1024;
+
+/// Cells of one beam at most, rays that look whether any of a cell is lit, and those that tell how much.
+const CELLS: usize = 512;
+const GLANCES: u32 = 4;
+const LOOKS: u32 = 16;
+
+/// A beam's end is at most so many rectangles, which are lit by this part at least if they can be.
+const RECTANGLES: usize = 32;
+const FULL: f64 = 0.7;
+
+/// The streams of sample points that these use.
+const ON_DISC: u32 = 0x0500;
+const IN_CELL: u32 = 0x0501;
+
+/// Cells along the radius of the disc, at least.
+const COARSEST: f64 = 8.0;
+
+/// A part of a triangle that a lamp lights through a small opening.
+#[derive(Clone, Debug)]
+pub struct Beam {
+    /// The lamp, by its number in the scene.
+    pub light: u32,
+    /// Mesh triangle.
+    pub triangle: u32,
+    /// Its side that is lit, and the unit normal of that.
+    pub side: Side,
+    /// Unit normal of that side.
+    pub normal: DVec3,
+    origin: DVec3,
+    axes: [DVec3; 2],
+    /// Of a cell, along the axes.
+    widths: [f64; 2],
+    /// In the order of `at`.
+    cells: Vec<Cell>,
+}
+
+/// A square of a [`Beam`].
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    at: [i32; 2],
+    /// Part of the square that is lit.
+    pub share: f32,
+    /// A place that is.
+    pub lit: DVec3,
+}
+
+impl Beam {
+    /// One of cells that are still to be found, along the edge that the seed comes from.
+    fn new(seed: &Seed, width: f64) -> Beam {
+        let Seed { light, side, place, along, .. } = *seed;
+        let axes = [along, place.normal.cross(along)];
+        let Place { point, normal, triangle } = place;
+        Beam { light, triangle, side, normal, origin: point, axes, widths: [width; 2], cells: Vec::new() }
+    }
+
+    /// Its cells, some of each of which are lit.
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// Area of a cell, m².
+    pub fn area(&self) -> f64 {
+        self.widths[0] * self.widths[1]
+    }
+
+    /// Its end as few rectangles: corners, counter-clockwise seen from the side that is lit, and the part of each that is lit. What is long and
+    /// lies across the grid is taken apart.
+    pub fn rectangles(&self) -> Vec<([DVec3; 4], f64)> {
+        let mut rectangles = Vec::new();
+        let mut waiting = vec![(self.cells.clone(), RECTANGLES)];
+        while let Some((cells, most)) = waiting.pop() {
+            let bounds = |axis: usize| {
+                let at = cells.iter().map(|cell| cell.at[axis]);
+                [at.clone().min().unwrap_or(0), at.max().unwrap_or(0) + 1]
+            };
+            let sides = [bounds(0), bounds(1)];
+            let lengths = [0, 1].map(|k| self.widths[k] * f64::from(sides[k][1] - sides[k][0]));
+            let lit = self.area() * cells.iter().map(|cell| f64::from(cell.share)).sum::<f64>();
+            let full = lit / (lengths[0] * lengths[1]);
+            if full < FULL && most > 1 {
+                let axis = usize::from(lengths[1] > lengths[0]);
+                let middle = (sides[axis][0] + sides[axis][1]) / 2;
+                let (low, high): (Vec<Cell>, Vec<Cell>) = cells.iter().partition(|cell| cell.at[axis] < middle);
+                waiting.extend([low, high].into_iter().filter(|part| !part.is_empty()).map(|part| (part, most / 2)));
+                continue;
+            }
+            let [[left, right], [low, high]] = sides;
+            let corners = [[left, low], [right, low], [right, high], [left, high]];
+            rectangles.push((corners.map(|at| self.within(at, 0.0, 0.0)), full));
+        }
+        rectangles
+    }
+
+    /// Whether a point of the triangle lies in a cell or beside one.
+    fn is_about(&self, point: DVec3) -> bool {
+        let [i, j] = self.at(point);
+        let around = (i - 1..=i + 1).flat_map(|i| (j - 1..=j + 1).map(move |j| [i, j]));
+        around.into_iter().any(|at| self.cells.binary_search_by_key(&at, |cell| cell.at).is_ok())
+    }
+
+    /// What is lit, m².
+    pub fn lit(&self) -> f64 {
+        self.area() * self.cells.iter().map(|cell| f64::from(cell.share)).sum::<f64>()
+    }
+
+    /// Whether it ends at a place of its triangle.
+    pub fn holds(&self, place: &Place) -> bool {
+        self.normal.dot(place.normal) > 0.0 && self.cell(place.point).is_some()
+    }
+
+    /// The number of the cell that a point of the triangle lies in.
+    pub fn cell(&self, point: DVec3) -> Option<usize> {
+        let at = self.at(point);
+        self.cells.binary_search_by_key(&at, |cell| cell.at).ok()
+    }
+
+    /// The point of a cell that (x, y) in the unit square tells; it may lie off the triangle.
+    pub fn point(&self, cell: usize, x: f64, y: f64) -> DVec3 {
+        self.within(self.cells[cell].at, x, y)
+    }
+
+    fn at(&self, point: DVec3) -> [i32; 2] {
+        [0, 1].map(|k| ((point - self.origin).dot(self.axes[k]) / self.widths[k]).floor() as i32)
+    }
+
+    fn within(&self, [i, j]: [i32; 2], x: f64, y: f64) -> DVec3 {
+        let [along, across] = [0, 1].map(|k| self.widths[k] * self.axes[k]);
+        self.origin + (f64::from(i) + x) * along + (f64::from(j) + y) * across
+    }
+
+    /// The places of a cell that are lit, of some that are spread over it.
+    fn lit_of<'s>(&'s self, tracer: &'s Tracer, at: [i32; 2], looks: u32) -> impl Iterator<Item = DVec3> + 's {
+        let [i, j] = at.map(|x| x as u32);
+        let seed = hash(i ^ hash(j ^ hash(self.triangle)));
+        let sequence = Sequence::new(seed, IN_CELL);
+        let light = &tracer.scene.lights[self.light as usize];
+        let places = (0..looks).map(move |look| {
+            let [x, y] = sequence.pair(look).map(f64::from);
+            Place { point: self.within(at, x, y), normal: self.normal, triangle: self.triangle }
+        });
+        let is_on = |place: &Place| {
+            let uv = tracer.mesh.barycentric(self.triangle as usize, place.point);
+            uv.x >= 0.0 && uv.y >= 0.0 && uv.x + uv.y <= 1.0
+        };
+        places.filter(move |place| is_on(place) && reaches(tracer, light, place, seed)).map(|place| place.point)
+    }
+
+    /// Grows it from a place that is lit. `None` where that is too much to be the end of a beam.
+    fn grown(mut self, tracer: &Tracer, from: DVec3, coarsest: f64) -> Option<Beam> {
+        while self.widths[0].min(self.widths[1]) <= coarsest {
+            let start = self.at(from);
+            let mut lit = HashMap::from([(start, from)]);
+            let mut next = VecDeque::from([start]);
+            while let Some([i, j]) = next.pop_front()
+                && lit.len() <= CELLS
+            {
+                for at in [[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]] {
+                    if !lit.contains_key(&at)
+                        && let Some(place) = self.lit_of(tracer, at, GLANCES).next()
+                    {
+                        lit.insert(at, place);
+                        next.push_back(at);
+                    }
+                }
+            }
+            if lit.len() <= CELLS {
+                let cell = |(at, lit)| {
+                    let share = self.lit_of(tracer, at, LOOKS).count().max(1) as f32 / LOOKS as f32;
+                    Cell { at, share, lit }
+                };
+                self.cells = lit.into_iter().map(cell).collect();
+                self.cells.sort_unstable_by_key(|cell| cell.at);
+                return Some(self);
+            }
+            // What is long has long cells: a slit would be lost between places that are spread over wide ones.
+            let length = |axis: usize| {
+                let (low, high) = lit.keys().fold((0, 0), |(low, high), at| (at[axis].min(low), at[axis].max(high)));
+                high - low
+            };
+            let axis = usize::from(length(1) > length(0));
+            self.widths[axis] *= 2.0;
+        }
+        None
+    }
+}
+
+/// The ends of all beams that were found.
+#[derive(Clone, Debug, Default)]
+pub struct Beams {
+    /// By triangle.
+    list: Vec<Beam>,
+}
+
+/// A place where a narrow beam ends.
+struct Seed {
+    light: u32,
+    side: Side,
+    place: Place,
+    /// Unit direction of the edge's shadow there.
+    along: DVec3,
+    /// The radius of the disc that tells what is narrow there.
+    radius: f64,
+}
+
+impl Beams {
+    pub(crate) fn find(tracer: &Tracer) -> Beams {
+        let lights = &tracer.scene.lights;
+        let shining = lights.iter().filter(|light| luminance(light.intensity) > 0.0).count();
+        if shining == 0 {
+            return Beams::default();
+        }
+        let edges = Edges::of(tracer.mesh);
+        let radius = (DISC * tracer.mesh.whole_area() / std::f64::consts::PI).sqrt();
+        let mut seeds: Vec<Seed> = Vec::new();
+        for (number, light) in (0..).zip(lights).filter(|(_, light)| luminance(light.intensity) > 0.0) {
+            seeds.extend(edges.seeds((tracer, radius), (number, light), PROBES / shining as f64));
+        }
+        // Too many are thinned evenly.
+        let many = seeds.len().max(SEEDS);
+        let mut number = 0;
+        seeds.retain(|_| {
+            number += 1;
+            number * SEEDS / many > (number - 1) * SEEDS / many
+        });
+        seeds.sort_by_key(|seed| (seed.place.triangle, seed.light));
+        let groups: Vec<&[Seed]> = seeds
+            .chunk_by(|a, b| (a.place.triangle, a.light) == (b.place.triangle, b.light))
+            .collect();
+        let grown = |group: &&[Seed]| {
+            let mut beams: Vec<Beam> = Vec::new();
+            for seed in *group {
+                let Seed { side, place, radius, .. } = seed;
+                if beams.iter().any(|beam| beam.side == *side && beam.is_about(place.point)) {
+                    continue;
+                }
+                let beam = Beam::new(seed, PAST * tracer.offset());
+                beams.extend(beam.grown(tracer, place.point, radius / COARSEST));
+            }
+            beams
+        };
+        Beams { list: groups.par_iter().flat_map_iter(grown).collect() }
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[Beam] {
+        &self.list
+    }
+
+    /// Those that end on a triangle, by their numbers.
+    pub fn on(&self, triangle: u32) -> Range<usize> {
+        if self.list.is_empty() {
+            return 0..0;
+        }
+        let start = self.list.partition_point(|beam| beam.triangle < triangle);
+        start..start + self.list[start..].iter().take_while(|beam| beam.triangle == triangle).count()
+    }
+}
+
+/// Whether a lamp lights a place.
+fn reaches(tracer: &Tracer, light: &PointLight, place: &Place, seed: u32) -> bool {
+    let (towards, distance, arriving) = light.arrival(place.point);
+    let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
+    towards.dot(place.normal) > 0.0
+        && luminance(arriving) > 0.0
+        && (length <= 0.0 || !tracer.blocked(&tracer.ray(place, towards, length), seed))
+}
+
+/// The edges of a mesh, and the corners of its triangles that lie opposite each.
+struct Edges<'a> {
+    mesh: &'a Mesh,
+    /// Ends of the edge, and the corner opposite it, of all triangles; those of one edge follow each other.
+    sides: Vec<[u32; 3]>,
+}
+
+impl Edges<'_> {
+    fn of(mesh: &Mesh) -> Edges<'_> {
+        let of_triangle = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, c]| [a.min(b), a.max(b), c]);
+        let mut sides: Vec<[u32; 3]> = mesh.triangles.par_iter().flat_map_iter(of_triangle).collect();
+        sides.par_sort_unstable();
+        Edges { mesh, sides }
+    }
+
+    /// Where narrow beams end that pass an edge which has nothing of its surfaces on one side, as the light sees it.
+    fn seeds(&self, of: (&Tracer, f64), (number, light): (u32, &PointLight), probes: f64) -> Vec<Seed> {
+        let outlines: Vec<Outline> =
+            self.sides.par_chunk_by(|a, b| a[..2] == b[..2]).filter_map(|own| self.outline(own, light)).collect();
+        let whole: f64 = outlines.iter().map(|outline| outline.along.length()).sum();
+        // As many to each edge as its length and its being one tell; where there are too many edges, one now and then.
+        let wanted = |outline: &Outline| {
+            let share = 0.5 * outline.along.length() / whole + 0.5 / outlines.len() as f64;
+            (probes * share).min(OF_EDGE)
+        };
+        let mut reached = 0.5;
+        let counted: Vec<(&Outline, u32)> = outlines
+            .iter()
+            .map(|outline| {
+                let before = f64::floor(reached);
+                reached += wanted(outline);
+                (outline, (reached.floor() - before) as u32)
+            })
+            .collect();
+        let seeds = |(index, (outline, count)): (usize, &(&Outline, u32))| {
+            let (count, salt) = (*count, hash(index as u32 ^ hash(number)));
+            let seed = move |k: u32| outline.seed(of, (number, light), (k, count), hash(salt ^ k));
+            (0..count).filter_map(seed).collect::<Vec<_>>()
+        };
+        counted.par_iter().enumerate().flat_map_iter(seeds).collect()
+    }
+
+    /// What is told of an edge by its triangles; `None` if these lie on both sides of it.
+    fn outline(&self, own: &[[u32; 3]], light: &PointLight) -> Option<Outline> {
+        let [a, b, _] = own[0].map(|v| self.mesh.vertices[v as usize]);
+        let along = b - a;
+        let (towards, ..) = light.arrival(a + 0.5 * along);
+        let across = along.cross(towards);
+        let turned = |corner: &[u32; 3]| {
+            let aside = self.mesh.vertices[corner[2] as usize] - a;
+            let turned = aside.dot(across);
+            // Of what is seen edge-on nothing lies on either side.
+            if turned.abs() > 1e-6 * along.length() * aside.length() { turned.signum() } else { 0.0 }
+        };
+        let (low, high) = own.iter().map(turned).fold((0.0, 0.0), |(low, high), x| (f64::min(low, x), f64::max(high, x)));
+        let away = if high > 0.0 { -across } else { across };
+        let away = away.try_normalize().filter(|_| low == 0.0 || high == 0.0)?;
+        Some(Outline { from: a, along, away })
+    }
+}
+
+/// An edge that hides what lies behind it, and the direction past it.
+struct Outline {
+    from: DVec3,
+    along: DVec3,
+    away: DVec3,
+}
+
+impl Outline {
+    /// Where a ray past it ends, at the k-th of some places along it, if that is the end of a narrow beam.
+    fn seed(
+        &self,
+        (tracer, radius): (&Tracer, f64),
+        (number, light): (u32, &PointLight),
+        (k, count): (u32, u32),
+        salt: u32,
+    ) -> Option<Seed> {
+        let share = (f64::from(k) + f64::from(unit(salt))) / f64::from(count);
+        let beside = self.from + share * self.along + PAST * tracer.offset() * self.away;
+        let (towards, ..) = light.arrival(beside);
+        let Found::Surface { triangle, uv, side, .. } = tracer.first(&tracer.free_ray(beside, -towards), salt) else {
+            return None;
+        };
+        let point = tracer.mesh.point(triangle as usize, DVec2::new(f64::from(uv[0]), f64::from(uv[1])));
+        let front = tracer.mesh.normal(triangle as usize);
+        let normal = if side == Side::Front { front } else { -front };
+        let place = Place { point, normal, triangle };
+        let radius = radius * tracer.scale(triangle as usize);
+        let is_end = reaches(tracer, light, &place, salt) && is_narrow(tracer, light, &place, radius, salt);
+        let along = normal.cross(self.along.cross(towards)).try_normalize()?;
+        is_end.then_some(Seed { light: number, side, place, along, radius })
+    }
+}
+
+/// Whether nearly nothing is lit of a disc around the place that faces the lamp.
+fn is_narrow(tracer: &Tracer, light: &PointLight, place: &Place, radius: f64, salt: u32) -> bool {
+    let (towards, distance, _) = light.arrival(place.point);
+    let radius = radius.min(0.5 * distance);
+    let [along, across, _] = frame(towards);
+    let sequence = Sequence::new(salt, ON_DISC);
+    let is_lit = |index: &u32| {
+        let [x, y] = sequence.pair(*index).map(f64::from);
+        let turn = TAU * y;
+        let point = place.point + radius * x.sqrt() * (turn.cos() * along + turn.sin() * across);
+        reaches(tracer, light, &Place { point, normal: towards, triangle: u32::MAX }, salt)
+    };
+    (0..AROUND).filter(is_lit).take(MANY).count() < MANY
+}
