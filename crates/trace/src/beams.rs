@@ -7,13 +7,13 @@
 //!
 //! What is cut out of a surface by its opacity has no edges, and is not looked for.
 
-use crate::sampling::{Sequence, frame, hash, unit};
+use crate::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use crate::{Found, Place, Tracer};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use radiosity_scene::{Mesh, PointLight, Side, luminance};
 use rayon::prelude::*;
 use std::collections::{HashMap, VecDeque};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 /// Rays past edges for all lights, about, and at most for each edge: an opening may be a small part of a long one.
@@ -27,7 +27,12 @@ const PAST: f64 = 16.0;
 /// that are seen from afar.
 const AROUND: u32 = 32;
 const MANY: usize = 2;
-const DISC: f64 = 1.0 / 512.0;
+const DISC: f64 = 1.0 / 64.0;
+
+/// The ends of beams are found by chance where more than this part of the rays would meet them that come from as far away as half of what they light is, by
+/// some rays; then they are left to it.
+const SMALL: f64 = 1.0 / 128.0;
+const SIGHTS: u32 = 16;
 
 /// Places from which the ends of beams are grown, at most.
 const SEEDS: usize = 1024;
@@ -37,13 +42,14 @@ const CELLS: usize = 512;
 const GLANCES: u32 = 4;
 const LOOKS: u32 = 16;
 
-/// A beam's end is at most so many rectangles, which are lit by this part at least if they can be.
+/// A beam's end is at most so many rectangles, and as many as it takes for none to have more than this part of it that is spread over what is not lit.
 const RECTANGLES: usize = 32;
-const FULL: f64 = 0.7;
+const UNEVEN: f64 = 0.02;
 
 /// The streams of sample points that these use.
 const ON_DISC: u32 = 0x0500;
 const IN_CELL: u32 = 0x0501;
+const FROM_END: u32 = 0x0502;
 
 /// Cells along the radius of the disc, at least.
 const COARSEST: f64 = 8.0;
@@ -96,32 +102,28 @@ impl Beam {
         self.widths[0] * self.widths[1]
     }
 
-    /// Its end as few rectangles: corners, counter-clockwise seen from the side that is lit, and the part of each that is lit. What is long and
-    /// lies across the grid is taken apart.
+    /// Its end as few rectangles: corners, counter-clockwise seen from the side that is lit, and the part of each that is lit. Those that are lit least evenly
+    /// are cut first.
     pub fn rectangles(&self) -> Vec<([DVec3; 4], f64)> {
-        let mut rectangles = Vec::new();
-        let mut waiting = vec![(self.cells.clone(), RECTANGLES)];
-        while let Some((cells, most)) = waiting.pop() {
-            let bounds = |axis: usize| {
-                let at = cells.iter().map(|cell| cell.at[axis]);
-                [at.clone().min().unwrap_or(0), at.max().unwrap_or(0) + 1]
-            };
-            let sides = [bounds(0), bounds(1)];
-            let lengths = [0, 1].map(|k| self.widths[k] * f64::from(sides[k][1] - sides[k][0]));
-            let lit = self.area() * cells.iter().map(|cell| f64::from(cell.share)).sum::<f64>();
-            let full = lit / (lengths[0] * lengths[1]);
-            if full < FULL && most > 1 {
-                let axis = usize::from(lengths[1] > lengths[0]);
-                let middle = (sides[axis][0] + sides[axis][1]) / 2;
-                let (low, high): (Vec<Cell>, Vec<Cell>) = cells.iter().partition(|cell| cell.at[axis] < middle);
-                waiting.extend([low, high].into_iter().filter(|part| !part.is_empty()).map(|part| (part, most / 2)));
-                continue;
-            }
-            let [[left, right], [low, high]] = sides;
-            let corners = [[left, low], [right, low], [right, high], [left, high]];
-            rectangles.push((corners.map(|at| self.within(at, 0.0, 0.0)), full));
+        let mut parts = vec![Part::new(self, self.cells.clone())];
+        let all = self.lit();
+        while parts.len() < RECTANGLES
+            && let Some(worst) = (0..parts.len()).max_by(|a, b| parts[*a].uneven.total_cmp(&parts[*b].uneven))
+            && parts[worst].uneven > UNEVEN * all
+        {
+            let Part { cells, sides, .. } = parts.swap_remove(worst);
+            let length = |axis: usize| self.widths[axis] * f64::from(sides[axis][1] - sides[axis][0]);
+            let is_single = |axis: usize| sides[axis][1] - sides[axis][0] < 2;
+            let axis = usize::from(is_single(0) || length(1) > length(0) && !is_single(1));
+            let middle = sides[axis][0].midpoint(sides[axis][1]);
+            let (low, high): (Vec<Cell>, Vec<Cell>) = cells.iter().partition(|cell| cell.at[axis] < middle);
+            parts.extend([low, high].map(|cells| Part::new(self, cells)));
         }
-        rectangles
+        let rectangle = |Part { sides: [[left, right], [low, high]], full, .. }: &Part| {
+            let corners = [[*left, *low], [*right, *low], [*right, *high], [*left, *high]];
+            (corners.map(|at| self.within(at, 0.0, 0.0)), *full)
+        };
+        parts.iter().map(rectangle).collect()
     }
 
     /// Whether a point of the triangle lies in a cell or beside one.
@@ -134,6 +136,34 @@ impl Beam {
     /// What is lit, m².
     pub fn lit(&self) -> f64 {
         self.area() * self.cells.iter().map(|cell| f64::from(cell.share)).sum::<f64>()
+    }
+
+    /// A place where it ends.
+    pub fn middle(&self) -> Place {
+        Place { point: self.cells[self.cells.len() / 2].lit, normal: self.normal, triangle: self.triangle }
+    }
+
+    /// The surfaces that some rays by cosine meet from there: how far away, and where.
+    pub fn sights(&self, tracer: &Tracer) -> Vec<(f64, Place)> {
+        let end = self.middle();
+        let (sequence, axes) = (Sequence::new(self.triangle, FROM_END), frame(self.normal));
+        let sight = |index: u32| {
+            let [u, v] = sequence.pair(index).map(f64::from);
+            let ray = tracer.ray(&end, cosine_direction(&axes, u, v), f64::INFINITY);
+            let found = tracer.first(&ray, hash(index));
+            let Found::Surface { distance, .. } = found else { return None };
+            Some((f64::from(distance), tracer.place(found)?))
+        };
+        (0..SIGHTS).filter_map(sight).collect()
+    }
+
+    /// Whether few rays would meet its end from where its light goes.
+    fn is_small(&self, tracer: &Tracer) -> bool {
+        let mut distances: Vec<f64> = self.sights(tracer).into_iter().map(|(far, _)| far).collect();
+        distances.sort_by(f64::total_cmp);
+        // The others see nothing at all.
+        let far = distances.get(SIGHTS as usize / 2).copied().unwrap_or(f64::INFINITY);
+        self.lit() < SMALL * PI * far * far
     }
 
     /// Whether it ends at a place of its triangle.
@@ -217,6 +247,31 @@ impl Beam {
     }
 }
 
+/// Some cells of a beam, and the rectangle around them.
+struct Part {
+    cells: Vec<Cell>,
+    /// The first cell along each axis, and the one after the last.
+    sides: [[i32; 2]; 2],
+    /// Which part of the rectangle is lit.
+    full: f64,
+    /// What is lit of it, m², by how unlike it is to all of it; nothing of what cannot be cut.
+    uneven: f64,
+}
+
+impl Part {
+    fn new(beam: &Beam, cells: Vec<Cell>) -> Part {
+        let sides = [0, 1].map(|axis| {
+            let at = cells.iter().map(|cell| cell.at[axis]);
+            [at.clone().min().unwrap_or(0), at.max().unwrap_or(0) + 1]
+        });
+        let count = sides.iter().map(|[low, high]| f64::from(high - low)).product::<f64>();
+        let lit: f64 = cells.iter().map(|cell| f64::from(cell.share)).sum();
+        let full = lit / count;
+        let uneven = if count > 1.0 { beam.area() * lit * (1.0 - full) } else { 0.0 };
+        Part { cells, sides, full, uneven }
+    }
+}
+
 /// The ends of all beams that were found.
 #[derive(Clone, Debug, Default)]
 pub struct Beams {
@@ -243,7 +298,7 @@ impl Beams {
             return Beams::default();
         }
         let edges = Edges::of(tracer.mesh);
-        let radius = (DISC * tracer.mesh.whole_area() / std::f64::consts::PI).sqrt();
+        let radius = (DISC * tracer.mesh.whole_area() / PI).sqrt();
         let mut seeds: Vec<Seed> = Vec::new();
         for (number, light) in (0..).zip(lights).filter(|(_, light)| luminance(light.intensity) > 0.0) {
             seeds.extend(edges.seeds((tracer, radius), (number, light), PROBES / shining as f64));
@@ -256,9 +311,8 @@ impl Beams {
             number * SEEDS / many > (number - 1) * SEEDS / many
         });
         seeds.sort_by_key(|seed| (seed.place.triangle, seed.light));
-        let groups: Vec<&[Seed]> = seeds
-            .chunk_by(|a, b| (a.place.triangle, a.light) == (b.place.triangle, b.light))
-            .collect();
+        let groups: Vec<&[Seed]> =
+            seeds.chunk_by(|a, b| (a.place.triangle, a.light) == (b.place.triangle, b.light)).collect();
         let grown = |group: &&[Seed]| {
             let mut beams: Vec<Beam> = Vec::new();
             for seed in *group {
@@ -269,6 +323,7 @@ impl Beams {
                 let beam = Beam::new(seed, PAST * tracer.offset());
                 beams.extend(beam.grown(tracer, place.point, radius / COARSEST));
             }
+            beams.retain(|beam| beam.is_small(tracer));
             beams
         };
         Beams { list: groups.par_iter().flat_map_iter(grown).collect() }
@@ -307,7 +362,8 @@ struct Edges<'a> {
 
 impl Edges<'_> {
     fn of(mesh: &Mesh) -> Edges<'_> {
-        let of_triangle = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, c]| [a.min(b), a.max(b), c]);
+        let of_triangle =
+            |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, c]| [a.min(b), a.max(b), c]);
         let mut sides: Vec<[u32; 3]> = mesh.triangles.par_iter().flat_map_iter(of_triangle).collect();
         sides.par_sort_unstable();
         Edges { mesh, sides }
@@ -352,7 +408,8 @@ impl Edges<'_> {
             // Of what is seen edge-on nothing lies on either side.
             if turned.abs() > 1e-6 * along.length() * aside.length() { turned.signum() } else { 0.0 }
         };
-        let (low, high) = own.iter().map(turned).fold((0.0, 0.0), |(low, high), x| (f64::min(low, x), f64::max(high, x)));
+        let (low, high) =
+            own.iter().map(turned).fold((0.0, 0.0), |(low, high), x| (f64::min(low, x), f64::max(high, x)));
         let away = if high > 0.0 { -across } else { across };
         let away = away.try_normalize().filter(|_| low == 0.0 || high == 0.0)?;
         Some(Outline { from: a, along, away })
@@ -378,16 +435,12 @@ impl Outline {
         let share = (f64::from(k) + f64::from(unit(salt))) / f64::from(count);
         let beside = self.from + share * self.along + PAST * tracer.offset() * self.away;
         let (towards, ..) = light.arrival(beside);
-        let Found::Surface { triangle, uv, side, .. } = tracer.first(&tracer.free_ray(beside, -towards), salt) else {
-            return None;
-        };
-        let point = tracer.mesh.point(triangle as usize, DVec2::new(f64::from(uv[0]), f64::from(uv[1])));
-        let front = tracer.mesh.normal(triangle as usize);
-        let normal = if side == Side::Front { front } else { -front };
-        let place = Place { point, normal, triangle };
-        let radius = radius * tracer.scale(triangle as usize);
+        let found = tracer.first(&tracer.free_ray(beside, -towards), salt);
+        let Found::Surface { side, .. } = found else { return None };
+        let place = tracer.place(found)?;
+        let radius = radius * tracer.scale(place.triangle as usize);
         let is_end = reaches(tracer, light, &place, salt) && is_narrow(tracer, light, &place, radius, salt);
-        let along = normal.cross(self.along.cross(towards)).try_normalize()?;
+        let along = place.normal.cross(self.along.cross(towards)).try_normalize()?;
         is_end.then_some(Seed { light: number, side, place, along, radius })
     }
 }
@@ -405,4 +458,94 @@ fn is_narrow(tracer: &Tracer, light: &PointLight, place: &Place, radius: f64, sa
         reaches(tracer, light, &Place { point, normal: towards, triangle: u32::MAX }, salt)
     };
     (0..AROUND).filter(is_lit).take(MANY).count() < MANY
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use radiosity_scene::{Material, PointLightKind, Scene};
+
+    /// A floor of 20 × 20 m, 10 m below a roof with an opening, walls, and the sun above.
+    fn hall([x, end]: [f64; 2], [y, top]: [f64; 2]) -> Scene {
+        let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
+        let corner = |k: usize| DVec3::new([0.0, 20.0][k & 1], [0.0, 20.0][k >> 1 & 1], [0.0, 10.0][k >> 2]);
+        for face in [[0, 1, 3, 2], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]] {
+            scene.add_quad("shell", 0, face.map(corner));
+        }
+        let mut roof = |[x, end]: [f64; 2], [y, top]: [f64; 2]| {
+            let corners = [[x, y], [x, top], [end, top], [end, y]].map(|[x, y]| DVec3::new(x, y, 10.0));
+            scene.add_quad("roof", 0, corners);
+        };
+        roof([0.0, x], [0.0, 20.0]);
+        roof([end, 20.0], [0.0, 20.0]);
+        roof([x, end], [0.0, y]);
+        roof([x, end], [top, 20.0]);
+        scene.lights.push(PointLight {
+            name: "sun".to_owned(),
+            kind: PointLightKind::Directional,
+            position: DVec3::ZERO,
+            direction: DVec3::new(0.2, 0.1, -1.0).normalize(),
+            intensity: [1e5; 3],
+            range: None,
+        });
+        scene
+    }
+
+    fn lit(scene: &Scene) -> f64 {
+        let mesh = Mesh::new(scene);
+        let tracer = Tracer::new(scene, &mesh);
+        tracer.beams().all().iter().map(Beam::lit).sum()
+    }
+
+    /// Each is found as large as it is, however small and long; and once, though two triangles share it and four edges lead there.
+    #[test]
+    fn ends_of_beams_are_as_large_as_their_openings() {
+        let openings = [
+            ([9.95, 10.05], [9.95, 10.05]),
+            ([12.0, 12.5], [3.0, 4.5]),
+            ([9.999, 10.001], [8.0, 12.0]),
+            ([9.0, 9.0005], [1.0, 18.0]),
+            ([6.0, 6.01], [4.0, 4.005]),
+        ];
+        for (x, y) in openings {
+            let (area, lit) = ((x[1] - x[0]) * (y[1] - y[0]), lit(&hall(x, y)));
+            assert!((lit - area).abs() < 0.03 * area, "{x:?} × {y:?}: {lit}, {area} m²");
+        }
+    }
+
+    /// No beams are where light falls widely: through a large opening, and around a table beneath a lamp.
+    #[test]
+    fn wide_light_is_no_beam() {
+        assert_eq!(lit(&hall([5.0, 15.0], [5.0, 15.0])), 0.0);
+        let mut room = hall([9.95, 10.05], [9.95, 10.05]);
+        room.lights[0].kind = PointLightKind::Point;
+        room.lights[0].position = DVec3::new(10.0, 10.0, 6.0);
+        let table = [[8.0, 9.0], [9.0, 9.0], [9.0, 10.0], [8.0, 10.0]].map(|[x, y]| DVec3::new(x, y, 0.8));
+        room.add_quad("table", 0, table);
+        assert_eq!(lit(&room), 0.0);
+    }
+
+    /// Rectangles hold what the cells do, also of what is long and lies across the grid.
+    #[test]
+    fn rectangles_have_the_light_of_their_cells() {
+        let scene = hall([9.999, 10.001], [8.0, 12.0]);
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        for beam in tracer.beams().all() {
+            for turned in [0.0, 0.7] {
+                let mut beam = beam.clone();
+                // As if the grid lay otherwise.
+                let (sin, cos) = f64::sin_cos(turned);
+                let [x, y] = beam.axes;
+                beam.axes = [cos * x + sin * y, cos * y - sin * x];
+                beam.widths = [0.02; 2];
+                let beam = beam.clone().grown(&tracer, beam.middle().point, 1.0).unwrap();
+                let rectangles = beam.rectangles();
+                assert!(rectangles.len() <= RECTANGLES);
+                let area = |[a, b, _, d]: &[DVec3; 4]| (*b - *a).cross(*d - *a).length();
+                let lit: f64 = rectangles.iter().map(|(corners, lit)| lit * area(corners)).sum();
+                assert!((lit - beam.lit()).abs() < 1e-9 * lit, "{lit}, {}", beam.lit());
+            }
+        }
+    }
 }

@@ -369,6 +369,14 @@ impl<'a> Tracer<'a> {
         hit.map_or(Found::Escaped, |hit| self.found(hit))
     }
 
+    /// The place that a ray met, on the side that it met; none but of surfaces.
+    pub fn place(&self, found: Found) -> Option<Place> {
+        let Found::Surface { triangle, uv: [u, v], side, .. } = found else { return None };
+        let point = self.mesh.point(triangle as usize, DVec2::new(f64::from(u), f64::from(v)));
+        let front = self.mesh.normal(triangle as usize);
+        Some(Place { point, normal: if side == Side::Front { front } else { -front }, triangle })
+    }
+
     /// Whether anything stops a ray before its end.
     #[inline]
     pub fn blocked(&self, ray: &Ray, seed: u32) -> bool {

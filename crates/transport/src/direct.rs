@@ -266,7 +266,8 @@ impl Luminaires {
                 for l in 0..lights {
                     let mut sums = [0f64; 6];
                     let mut carried = [0f64; 3];
-                    for (((visible, open), weight), place) in lit.chunks_exact(lights).zip(&open).zip(&weights).zip(&at) {
+                    for (((visible, open), weight), place) in lit.chunks_exact(lights).zip(&open).zip(&weights).zip(&at)
+                    {
                         for band in 0..3 {
                             sums[band] += weight * visible[l][band];
                             sums[band + 3] += weight * open * visible[l][band];

@@ -1,8 +1,8 @@
 //! Where light is asked for: elements while the equation is solved, points when an answer is read.
 
-use crate::{Exposure, Luminaires};
 use crate::exposure::{is_buried, open_place};
 use crate::gather::near;
+use crate::{Exposure, Luminaires};
 use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Elements, Mesh};

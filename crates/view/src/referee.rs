@@ -15,11 +15,11 @@
 //! Where lamps without area light something through a small opening, the end of the beam is itself a lamp to all that sees it: it is sampled by
 //! area and weighted against the paths that meet it by chance (`beams.rs`).
 
+use beams::BeamEnds;
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, Surface, luminance};
 use radiosity_trace::sampling::{Random, Sequence, cosine_direction, frame, shuffled};
 use radiosity_trace::{Emitter, EmitterTree, Found, Place, Tracer};
-use beams::BeamEnds;
 use std::f64::consts::PI;
 
 mod beams;
@@ -119,7 +119,15 @@ impl<'a> Referee<'a> {
         emitters.iter_mut().for_each(|emitter| emitter.density /= sum);
         ends.iter_mut().for_each(|end| *end /= sum);
         let from_lamps = !emitters.is_empty();
-        Referee { tracer, emitters, tree: EmitterTree::new(&boxes, 1), ends, from_lamps, emitter_of, beams: BeamEnds::new(tracer) }
+        Referee {
+            tracer,
+            emitters,
+            tree: EmitterTree::new(&boxes, 1),
+            ends,
+            from_lamps,
+            emitter_of,
+            beams: BeamEnds::new(tracer),
+        }
     }
 
     /// Irradiance (lux per band) at a place: the mean of `samples` paths. Different `seed`s are independent.

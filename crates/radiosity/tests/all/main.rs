@@ -1,5 +1,6 @@
 //! All tests from outside in one program: one to compile and to link.
 
+mod beams;
 #[path = "../common/bits.rs"]
 mod bits;
 mod curved;

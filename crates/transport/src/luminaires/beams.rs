@@ -8,34 +8,25 @@ use crate::one_light::{geometry, luminance_of};
 use crate::parts::Parts;
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Elements, Mesh, luminance};
-use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash};
-use radiosity_trace::{Beam, Found, Place, Tracer};
+use radiosity_trace::sampling::hash;
+use radiosity_trace::{Beam, Place, Tracer};
 use rayon::prelude::*;
-use std::f64::consts::PI;
 
 /// Name of the light that they are.
 pub const BEAMS: &str = "ends of narrow beams";
 
 /// They are none where more than this part of their cells is lit: elements tell that themselves, and are exact from nearby, too.
-const LEAST_LIT: f64 = 0.25;
-
-/// Nor where more than this part of the rays would meet them that come from as far away as half of what they light is, by some rays.
-const SMALL: f64 = 1.0 / 256.0;
-const LOOKS: u32 = 16;
+const LEAST_LIT: f64 = 0.7;
 
 /// Nor where they give less than this part of what other lights give to what they light.
-const NEGLIGIBLE: f64 = 0.02;
-
-/// The stream of sample points that these rays use.
-const SEEN: u32 = 0x0230;
+const NEGLIGIBLE: f64 = 0.05;
 
 impl Luminaires {
     /// With the ends of narrow beams as one more light, the last, if there are any.
     pub fn with_beams(mut self, tracer: &Tracer, elements: &Elements) -> Luminaires {
         let beams = tracer.beams().all();
-        let is_light = |beam: &Beam| {
-            share_of_cells(beam, tracer.mesh, elements) < LEAST_LIT && self.stands_out(tracer, beam)
-        };
+        let is_light =
+            |beam: &Beam| share_of_cells(beam, tracer.mesh, elements) < LEAST_LIT && self.stands_out(tracer, beam);
         let is_light: Vec<bool> = beams.par_iter().map(is_light).collect();
         let own = beams.iter().zip(&is_light).filter(|(_, is_light)| **is_light);
         let pieces: Vec<Piece> = own.flat_map(|(beam, _)| pieces(tracer, beam)).collect();
@@ -48,36 +39,17 @@ impl Luminaires {
         self.with(lights)
     }
 
-    /// Whether the end of a beam is too small for rays from what it lights, and not outshone there by other lights.
+    /// Whether the end of a beam is not outshone by other lights where its own light goes.
     fn stands_out(&self, tracer: &Tracer, beam: &Beam) -> bool {
-        let middle = beam.cells()[beam.cells().len() / 2].lit;
-        let end = Place { point: middle, normal: beam.normal, triangle: beam.triangle };
-        let (sequence, axes) = (Sequence::new(beam.triangle, SEEN), frame(beam.normal));
-        let seen = |index: u32| {
-            let [u, v] = sequence.pair(index).map(f64::from);
-            let ray = tracer.ray(&end, cosine_direction(&axes, u, v), f64::INFINITY);
-            let Found::Surface { triangle, uv: [u, v], side, distance } = tracer.first(&ray, hash(index)) else {
-                return None;
-            };
-            let (mesh, t) = (tracer.mesh, triangle as usize);
-            let sign = if side == radiosity_scene::Side::Front { 1.0 } else { -1.0 };
-            let point = mesh.point(t, DVec2::new(f64::from(u), f64::from(v)));
-            Some((f64::from(distance), Place { point, normal: sign * mesh.normal(t), triangle }))
-        };
-        let seen: Vec<Option<(f64, Place)>> = (0..LOOKS).map(seen).collect();
-        let mut distances: Vec<f64> = seen.iter().map(|seen| seen.map_or(f64::INFINITY, |(far, _)| far)).collect();
-        distances.sort_by(f64::total_cmp);
-        let far = distances[distances.len() / 2];
-        if beam.lit() > SMALL * PI * far * far {
-            return false;
-        }
-        let flux: f64 = pieces(tracer, beam).iter().map(|piece| piece.area * f64::from(luminance(piece.exitance))).sum();
+        let end = beam.middle();
+        let power = |piece: &Piece| piece.area * f64::from(luminance(piece.exitance));
+        let flux: f64 = pieces(tracer, beam).iter().map(power).sum();
         let mut parts = Parts::default();
         let (mut own, mut others) = (0.0, 0.0);
-        for (k, (_, place)) in (0..).zip(seen.iter().flatten()) {
-            own += flux * geometry(place, &end);
-            let lights = 0..self.lights.len();
-            others += lights.map(|l| luminance_of(self.sample(l, tracer, place, hash(k), &mut parts))).sum::<f64>();
+        for (k, (_, place)) in (0..).zip(beam.sights(tracer)) {
+            own += flux * geometry(&place, &end);
+            let of_light = |light: usize| luminance_of(self.sample(light, tracer, &place, hash(k), &mut parts));
+            others += (0..self.lights.len()).map(of_light).sum::<f64>();
         }
         own > NEGLIGIBLE * others
     }

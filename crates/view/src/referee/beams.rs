@@ -8,7 +8,7 @@ use radiosity_trace::{Beams, Emitter, EmitterTree, Place, Tracer};
 use std::f64::consts::PI;
 
 /// Which of their cells to sample from where.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct BeamEnds {
     tree: EmitterTree,
     /// Beam and cell of each emitter of the tree.
@@ -76,6 +76,9 @@ impl BeamEnds {
 
     /// Weight of what a lamp gives to a place that a path met by chance.
     pub fn weight(&self, tracer: &Tracer, from: &Place, place: &Place, light: u32) -> f64 {
+        if self.cells.is_empty() {
+            return 1.0;
+        }
         let sampled = self.density(tracer.beams(), from, place, light);
         if sampled > 0.0 { balance(density(from, place), sampled) } else { 1.0 }
     }
@@ -85,7 +88,8 @@ impl BeamEnds {
         let own = beams.on(end.triangle).map(|number| (number, &beams.all()[number]));
         let lit = own.filter(|(_, beam)| beam.light == light && beam.holds(end));
         let of_cell = |(number, cell): (usize, usize)| {
-            self.tree.probability(self.first[number] + cell as u32, from.point, from.normal) / beams.all()[number].area()
+            self.tree.probability(self.first[number] + cell as u32, from.point, from.normal)
+                / beams.all()[number].area()
         };
         lit.filter_map(|(number, beam)| Some((number, beam.cell(end.point)?))).map(of_cell).sum()
     }
@@ -97,4 +101,85 @@ fn density(from: &Place, to: &Place) -> f64 {
     let square = along.length_squared();
     let cosines = along.dot(from.normal).max(0.0) * along.dot(to.normal).abs();
     if square > 0.0 { cosines / (PI * square * square) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Referee;
+    use glam::DVec3;
+    use radiosity_scene::{Material, Mesh, PointLight, PointLightKind, Scene, Transmission};
+
+    /// A room of 4 × 3 × 2.5 m with a hole of 15 cm in its ceiling, the sun above, and maybe a sheet on which the spot falls.
+    fn room(sheet: Option<Material>) -> Scene {
+        let grey = Material { base_color: [0.7, 0.7, 0.7, 1.0], ..Material::default() };
+        let mut scene = Scene { materials: vec![grey], ..Scene::default() };
+        let corner = |k: usize| DVec3::new([0.0, 4.0][k & 1], [0.0, 3.0][k >> 1 & 1], [0.0, 2.5][k >> 2]);
+        for face in [[0, 1, 3, 2], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]] {
+            scene.add_quad("room", 0, face.map(corner));
+        }
+        let mut flat = |material, [x, end]: [f64; 2], [y, top]: [f64; 2], z| {
+            let corners = [[x, y], [x, top], [end, top], [end, y]].map(|[x, y]| DVec3::new(x, y, z));
+            scene.add_quad("flat", material, corners);
+        };
+        flat(0, [0.0, 2.0], [0.0, 3.0], 2.5);
+        flat(0, [2.15, 4.0], [0.0, 3.0], 2.5);
+        flat(0, [2.0, 2.15], [0.0, 1.5], 2.5);
+        flat(0, [2.0, 2.15], [1.65, 3.0], 2.5);
+        if let Some(sheet) = sheet {
+            flat(1, [1.0, 3.0], [0.5, 2.5], 0.6);
+            scene.materials.push(sheet);
+        }
+        scene.lights.push(PointLight {
+            name: "sun".to_owned(),
+            kind: PointLightKind::Directional,
+            position: DVec3::ZERO,
+            direction: DVec3::new(0.1, 0.2, -1.0).normalize(),
+            intensity: [1e5; 3],
+            range: None,
+        });
+        scene
+    }
+
+    /// What is sampled where beams end changes what is found by chance, and nothing else, on a sheet and behind it, too.
+    #[test]
+    fn ends_of_beams_are_the_light_that_paths_find() {
+        let opal = Material {
+            base_color: [0.4, 0.4, 0.4, 1.0],
+            transmission: Some(Transmission {
+                transmittance: [0.5; 3],
+                texture: None,
+                replaced: 0.0,
+                share_texture: None,
+            }),
+            ..Material::default()
+        };
+        // With how much more variance at least light is found by chance; what passes a sheet is found by chance alone.
+        let cases = [
+            (None, DVec3::new(0.5, 1.0, 2.0), -DVec3::Z, 20.0),
+            (Some(opal.clone()), DVec3::new(0.5, 1.0, 2.0), -DVec3::Z, 0.0),
+            (Some(opal), DVec3::new(1.5, 1.0, 0.01), DVec3::Z, 0.0),
+        ];
+        for (sheet, point, normal, times) in cases {
+            let scene = room(sheet);
+            let mesh = Mesh::new(&scene);
+            let tracer = Tracer::new(&scene, &mesh);
+            let referee = Referee::new(&tracer);
+            let plain = Referee { beams: BeamEnds::default(), ..referee.clone() };
+            assert!(!tracer.beams().all().is_empty());
+            let place = Place { point, normal, triangle: u32::MAX };
+            let seen = |referee: &Referee, runs: u64| {
+                let of_run = |run| f64::from(luminance(referee.irradiance(&place, 1024, run)));
+                let light: Vec<f64> = (0..runs).map(of_run).collect();
+                let n = runs as f64;
+                let mean = light.iter().sum::<f64>() / n;
+                let variance = light.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1.0);
+                [mean, (variance / n).sqrt(), variance]
+            };
+            let ([by_chance, plain_error, variance], [mean, error, less]) = (seen(&plain, 512), seen(&referee, 64));
+            let off = (mean - by_chance).abs() / plain_error.hypot(error);
+            assert!(off < 3.0, "{by_chance} ± {plain_error}, {mean} ± {error}");
+            assert!(variance > times * less, "{variance}, {less}");
+        }
+    }
 }
