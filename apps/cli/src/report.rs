@@ -4,8 +4,6 @@ use crate::illuminance::Illuminance;
 use crate::progress::Progress;
 use crate::{Failure, faults, figures, input, numbers};
 use radiosity::measure::{Round, is_stalled};
-use radiosity::transport::Light;
-use radiosity::transport::luminaires::BEAMS;
 use radiosity::{
     Audit, Baked, Balance, Dim, Faults, Lightmap, Material, Scene, Shown, Sky, View, WrittenRound, counted,
 };
@@ -370,8 +368,7 @@ impl Report {
                 format!("vertices are {width:.3} m apart, {advice}")
             }
         };
-        let is_lamp = |(_, light): &(usize, &Light)| light.name() != BEAMS;
-        let lights = solution.luminaires.lights.iter().enumerate().filter(is_lamp);
+        let lights = solution.luminaires.lamps().iter().enumerate();
         let light = |(i, name): (usize, &str)| match name {
             "" => format!("light {i}"),
             name => name.to_owned(),

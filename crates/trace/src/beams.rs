@@ -5,7 +5,8 @@
 //! that passes there goes on to where it ends. Where the lamp reaches that place, and about the ray nearly nothing, there is a beam. Its end
 //! is told by cells of a grid on the triangle, as many as reach from one lit cell to the next, which are made larger until they are few.
 //!
-//! What is cut out of a surface by its opacity has no edges, and is not looked for.
+//! What is cut out of a surface by its opacity has no edges, and is not looked for; nor is anything where panes let a part of the light pass by chance, or
+//! where there are millions of triangles.
 
 use crate::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use crate::{Found, Place, Tracer};
@@ -20,30 +21,36 @@ use std::ops::Range;
 const PROBES: f64 = (1 << 17) as f64;
 const OF_EDGE: f64 = 64.0;
 
+/// No beams are looked for among more triangles than this, as their edges would take hundreds of megabytes; and past the edges of so many triangles, each
+/// for one light, and a few more. The brightest lights are taken.
+const MOST_TRIANGLES: usize = 1 << 22;
+const MOST_LOOKS: usize = 1 << 25;
+
 /// Offsets of ray origins by which such rays pass an edge.
 const PAST: f64 = 16.0;
 
-/// A beam is narrow where of so many places on a disc around it fewer than so many are lit. The disc has this part of the area of all surfaces, at triangles
-/// that are seen from afar.
+/// A beam is narrow where of so many places on a disc around it fewer than so many are lit. The disc has this part of the area of all surfaces at most, and a
+/// radius of this part of how far the place sees, or a hall on a wide site would be taken for the site.
 const AROUND: u32 = 32;
 const MANY: usize = 2;
 const DISC: f64 = 1.0 / 64.0;
+const REACH: f64 = 0.5;
 
 /// The ends of beams are found by chance where more than this part of the rays would meet them that come from as far away as half of what they light is, by
 /// some rays; then they are left to it.
 const SMALL: f64 = 1.0 / 128.0;
 const SIGHTS: u32 = 16;
 
-/// Places from which the ends of beams are grown, at most.
+/// Places from which the ends of beams are grown, at most, and how many of them on one triangle may be too much to be one.
 const SEEDS: usize = 1024;
+const FAILURES: usize = 16;
 
 /// Cells of one beam at most, rays that look whether any of a cell is lit, and those that tell how much.
 const CELLS: usize = 512;
 const GLANCES: u32 = 4;
 const LOOKS: u32 = 16;
 
-/// A beam's end is at most so many rectangles, and as many as it takes for none to have more than this part of it that is spread over what is not lit.
-const RECTANGLES: usize = 32;
+/// A beam's end is as many rectangles as it takes for none to have more than this part of it that is spread over what is not lit.
 const UNEVEN: f64 = 0.02;
 
 /// The streams of sample points that these use.
@@ -69,8 +76,21 @@ pub struct Beam {
     axes: [DVec3; 2],
     /// Of a cell, along the axes.
     widths: [f64; 2],
+    /// Corners of a box around it.
+    bounds: [DVec3; 2],
     /// In the order of `at`.
     cells: Vec<Cell>,
+}
+
+/// A part of a beam's end.
+#[derive(Clone, Debug)]
+pub struct Rectangle {
+    /// Counter-clockwise seen from the side that is lit.
+    pub corners: [DVec3; 4],
+    /// The cells in it, some of each of which are lit.
+    pub cells: Vec<Cell>,
+    /// How many it would take to fill it.
+    pub count: f64,
 }
 
 /// A square of a [`Beam`].
@@ -89,7 +109,17 @@ impl Beam {
         let Seed { light, side, place, along, .. } = *seed;
         let axes = [along, place.normal.cross(along)];
         let Place { point, normal, triangle } = place;
-        Beam { light, triangle, side, normal, origin: point, axes, widths: [width; 2], cells: Vec::new() }
+        Beam {
+            light,
+            triangle,
+            side,
+            normal,
+            origin: point,
+            axes,
+            widths: [width; 2],
+            bounds: [point; 2],
+            cells: Vec::new(),
+        }
     }
 
     /// Its cells, some of each of which are lit.
@@ -102,12 +132,16 @@ impl Beam {
         self.widths[0] * self.widths[1]
     }
 
-    /// Its end as few rectangles: corners, counter-clockwise seen from the side that is lit, and the part of each that is lit. Those that are lit least evenly
-    /// are cut first.
-    pub fn rectangles(&self) -> Vec<([DVec3; 4], f64)> {
+    /// Corners of a box around its end.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.bounds
+    }
+
+    /// Its end as few rectangles, `most` at most. Those that are lit least evenly are cut first.
+    pub fn rectangles(&self, most: usize) -> Vec<Rectangle> {
         let mut parts = vec![Part::new(self, self.cells.clone())];
         let all = self.lit();
-        while parts.len() < RECTANGLES
+        while parts.len() < most
             && let Some(worst) = (0..parts.len()).max_by(|a, b| parts[*a].uneven.total_cmp(&parts[*b].uneven))
             && parts[worst].uneven > UNEVEN * all
         {
@@ -119,11 +153,11 @@ impl Beam {
             let (low, high): (Vec<Cell>, Vec<Cell>) = cells.iter().partition(|cell| cell.at[axis] < middle);
             parts.extend([low, high].map(|cells| Part::new(self, cells)));
         }
-        let rectangle = |Part { sides: [[left, right], [low, high]], full, .. }: &Part| {
-            let corners = [[*left, *low], [*right, *low], [*right, *high], [*left, *high]];
-            (corners.map(|at| self.within(at, 0.0, 0.0)), *full)
+        let rectangle = |Part { sides: [[left, right], [low, high]], count, cells, .. }: Part| {
+            let corners = [[left, low], [right, low], [right, high], [left, high]];
+            Rectangle { corners: corners.map(|at| self.within(at, 0.0, 0.0)), cells, count }
         };
-        parts.iter().map(rectangle).collect()
+        parts.into_iter().map(rectangle).collect()
     }
 
     /// Whether a point of the triangle lies in a cell or beside one.
@@ -145,25 +179,12 @@ impl Beam {
 
     /// The surfaces that some rays by cosine meet from there: how far away, and where.
     pub fn sights(&self, tracer: &Tracer) -> Vec<(f64, Place)> {
-        let end = self.middle();
-        let (sequence, axes) = (Sequence::new(self.triangle, FROM_END), frame(self.normal));
-        let sight = |index: u32| {
-            let [u, v] = sequence.pair(index).map(f64::from);
-            let ray = tracer.ray(&end, cosine_direction(&axes, u, v), f64::INFINITY);
-            let found = tracer.first(&ray, hash(index));
-            let Found::Surface { distance, .. } = found else { return None };
-            Some((f64::from(distance), tracer.place(found)?))
-        };
-        (0..SIGHTS).filter_map(sight).collect()
+        sights(tracer, &self.middle(), self.triangle)
     }
 
     /// Whether few rays would meet its end from where its light goes.
     fn is_small(&self, tracer: &Tracer) -> bool {
-        let mut distances: Vec<f64> = self.sights(tracer).into_iter().map(|(far, _)| far).collect();
-        distances.sort_by(f64::total_cmp);
-        // The others see nothing at all.
-        let far = distances.get(SIGHTS as usize / 2).copied().unwrap_or(f64::INFINITY);
-        self.lit() < SMALL * PI * far * far
+        self.lit() < SMALL * PI * middle_of(self.sights(tracer)).powi(2)
     }
 
     /// Whether it ends at a place of its triangle.
@@ -191,8 +212,13 @@ impl Beam {
         self.origin + (f64::from(i) + x) * along + (f64::from(j) + y) * across
     }
 
-    /// The places of a cell that are lit, of some that are spread over it.
-    fn lit_of<'s>(&'s self, tracer: &'s Tracer, at: [i32; 2], looks: u32) -> impl Iterator<Item = DVec3> + 's {
+    /// The places of a cell that are lit and that no earlier beam has, of some that are spread over it.
+    fn lit_of<'s>(
+        &'s self,
+        (tracer, earlier): (&'s Tracer, &'s [Beam]),
+        at: [i32; 2],
+        looks: u32,
+    ) -> impl Iterator<Item = DVec3> + 's {
         let [i, j] = at.map(|x| x as u32);
         let seed = hash(i ^ hash(j ^ hash(self.triangle)));
         let sequence = Sequence::new(seed, IN_CELL);
@@ -205,11 +231,14 @@ impl Beam {
             let uv = tracer.mesh.barycentric(self.triangle as usize, place.point);
             uv.x >= 0.0 && uv.y >= 0.0 && uv.x + uv.y <= 1.0
         };
-        places.filter(move |place| is_on(place) && reaches(tracer, light, place, seed)).map(|place| place.point)
+        let is_free = |place: &Place| !earlier.iter().any(|beam| beam.holds(place));
+        places
+            .filter(move |place| is_on(place) && is_free(place) && reaches(tracer, light, place, seed))
+            .map(|place| place.point)
     }
 
     /// Grows it from a place that is lit. `None` where that is too much to be the end of a beam.
-    fn grown(mut self, tracer: &Tracer, from: DVec3, coarsest: f64) -> Option<Beam> {
+    fn grown(mut self, of: (&Tracer, &[Beam]), from: DVec3, coarsest: f64) -> Option<Beam> {
         while self.widths[0].min(self.widths[1]) <= coarsest {
             let start = self.at(from);
             let mut lit = HashMap::from([(start, from)]);
@@ -219,7 +248,7 @@ impl Beam {
             {
                 for at in [[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]] {
                     if !lit.contains_key(&at)
-                        && let Some(place) = self.lit_of(tracer, at, GLANCES).next()
+                        && let Some(place) = self.lit_of(of, at, GLANCES).next()
                     {
                         lit.insert(at, place);
                         next.push_back(at);
@@ -228,11 +257,15 @@ impl Beam {
             }
             if lit.len() <= CELLS {
                 let cell = |(at, lit)| {
-                    let share = self.lit_of(tracer, at, LOOKS).count().max(1) as f32 / LOOKS as f32;
+                    let share = self.lit_of(of, at, LOOKS).count().max(1) as f32 / LOOKS as f32;
                     Cell { at, share, lit }
                 };
                 self.cells = lit.into_iter().map(cell).collect();
                 self.cells.sort_unstable_by_key(|cell| cell.at);
+                let corners = self.cells.iter().flat_map(|cell| {
+                    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| self.within(cell.at, x, y))
+                });
+                self.bounds = corners.fold([from; 2], |[low, high], p| [low.min(p), high.max(p)]);
                 return Some(self);
             }
             // What is long has long cells: a slit would be lost between places that are spread over wide ones.
@@ -252,8 +285,8 @@ struct Part {
     cells: Vec<Cell>,
     /// The first cell along each axis, and the one after the last.
     sides: [[i32; 2]; 2],
-    /// Which part of the rectangle is lit.
-    full: f64,
+    /// How many cells the rectangle has.
+    count: f64,
     /// What is lit of it, m², by how unlike it is to all of it; nothing of what cannot be cut.
     uneven: f64,
 }
@@ -266,9 +299,8 @@ impl Part {
         });
         let count = sides.iter().map(|[low, high]| f64::from(high - low)).product::<f64>();
         let lit: f64 = cells.iter().map(|cell| f64::from(cell.share)).sum();
-        let full = lit / count;
-        let uneven = if count > 1.0 { beam.area() * lit * (1.0 - full) } else { 0.0 };
-        Part { cells, sides, full, uneven }
+        let uneven = if count > 1.0 { beam.area() * lit * (1.0 - lit / count) } else { 0.0 };
+        Part { cells, sides, count, uneven }
     }
 }
 
@@ -292,17 +324,20 @@ struct Seed {
 
 impl Beams {
     pub(crate) fn find(tracer: &Tracer) -> Beams {
-        let lights = &tracer.scene.lights;
-        let shining = lights.iter().filter(|light| luminance(light.intensity) > 0.0).count();
-        if shining == 0 {
+        let triangles = tracer.mesh.triangles.len();
+        let power = |light: &PointLight| luminance(light.intensity);
+        let mut lights: Vec<(u32, &PointLight)> =
+            (0..).zip(&tracer.scene.lights).filter(|(_, l)| power(l) > 0.0).collect();
+        if lights.is_empty() || triangles > MOST_TRIANGLES || tracer.has_panes() {
             return Beams::default();
         }
+        lights.sort_by(|(_, a), (_, b)| power(b).total_cmp(&power(a)));
+        lights.truncate(MOST_LOOKS / triangles.max(1) + 1);
         let edges = Edges::of(tracer.mesh);
         let radius = (DISC * tracer.mesh.whole_area() / PI).sqrt();
-        let mut seeds: Vec<Seed> = Vec::new();
-        for (number, light) in (0..).zip(lights).filter(|(_, light)| luminance(light.intensity) > 0.0) {
-            seeds.extend(edges.seeds((tracer, radius), (number, light), PROBES / shining as f64));
-        }
+        let probes = PROBES / lights.len() as f64;
+        let mut seeds: Vec<Seed> =
+            lights.into_iter().flat_map(|light| edges.seeds((tracer, radius), light, probes)).collect();
         // Too many are thinned evenly.
         let many = seeds.len().max(SEEDS);
         let mut number = 0;
@@ -315,13 +350,20 @@ impl Beams {
             seeds.chunk_by(|a, b| (a.place.triangle, a.light) == (b.place.triangle, b.light)).collect();
         let grown = |group: &&[Seed]| {
             let mut beams: Vec<Beam> = Vec::new();
+            let mut failures = 0;
             for seed in *group {
                 let Seed { side, place, radius, .. } = seed;
                 if beams.iter().any(|beam| beam.side == *side && beam.is_about(place.point)) {
                     continue;
                 }
                 let beam = Beam::new(seed, PAST * tracer.offset());
-                beams.extend(beam.grown(tracer, place.point, radius / COARSEST));
+                match beam.grown((tracer, &beams), place.point, radius / COARSEST) {
+                    Some(beam) => beams.push(beam),
+                    None => failures += 1,
+                }
+                if failures > FAILURES {
+                    break;
+                }
             }
             beams.retain(|beam| beam.is_small(tracer));
             beams
@@ -342,6 +384,25 @@ impl Beams {
         let start = self.list.partition_point(|beam| beam.triangle < triangle);
         start..start + self.list[start..].iter().take_while(|beam| beam.triangle == triangle).count()
     }
+}
+
+/// The surfaces that some rays by cosine meet from a place: how far away, and where.
+fn sights(tracer: &Tracer, from: &Place, salt: u32) -> Vec<(f64, Place)> {
+    let (sequence, axes) = (Sequence::new(salt, FROM_END), frame(from.normal));
+    let sight = |index: u32| {
+        let [u, v] = sequence.pair(index).map(f64::from);
+        let found = tracer.first(&tracer.ray(from, cosine_direction(&axes, u, v), f64::INFINITY), hash(index));
+        let Found::Surface { distance, .. } = found else { return None };
+        Some((f64::from(distance), tracer.place(found)?))
+    };
+    (0..SIGHTS).filter_map(sight).collect()
+}
+
+/// How far most of what a place sees is away; without end where half of it is nothing at all.
+fn middle_of(sights: Vec<(f64, Place)>) -> f64 {
+    let mut distances: Vec<f64> = sights.into_iter().map(|(far, _)| far).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(SIGHTS as usize / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// Whether a lamp lights a place.
@@ -412,7 +473,7 @@ impl Edges<'_> {
             own.iter().map(turned).fold((0.0, 0.0), |(low, high), x| (f64::min(low, x), f64::max(high, x)));
         let away = if high > 0.0 { -across } else { across };
         let away = away.try_normalize().filter(|_| low == 0.0 || high == 0.0)?;
-        Some(Outline { from: a, along, away })
+        Some(Outline { from: a, along, away, has_sides: low == 0.0 && high == 0.0 })
     }
 }
 
@@ -421,6 +482,8 @@ struct Outline {
     from: DVec3,
     along: DVec3,
     away: DVec3,
+    /// Whether there is nothing on either side.
+    has_sides: bool,
 }
 
 impl Outline {
@@ -433,13 +496,17 @@ impl Outline {
         salt: u32,
     ) -> Option<Seed> {
         let share = (f64::from(k) + f64::from(unit(salt))) / f64::from(count);
-        let beside = self.from + share * self.along + PAST * tracer.offset() * self.away;
+        let away = if self.has_sides && salt & 1 == 1 { -self.away } else { self.away };
+        let beside = self.from + share * self.along + PAST * tracer.offset() * away;
         let (towards, ..) = light.arrival(beside);
         let found = tracer.first(&tracer.free_ray(beside, -towards), salt);
         let Found::Surface { side, .. } = found else { return None };
         let place = tracer.place(found)?;
-        let radius = radius * tracer.scale(place.triangle as usize);
-        let is_end = reaches(tracer, light, &place, salt) && is_narrow(tracer, light, &place, radius, salt);
+        if !reaches(tracer, light, &place, salt) {
+            return None;
+        }
+        let radius = radius.min(REACH * middle_of(sights(tracer, &place, salt)));
+        let is_end = is_narrow(tracer, light, &place, radius, salt);
         let along = place.normal.cross(self.along.cross(towards)).try_normalize()?;
         is_end.then_some(Seed { light: number, side, place, along, radius })
     }
@@ -491,6 +558,25 @@ mod tests {
         scene
     }
 
+    /// On wide sunlit ground it is the same hall.
+    #[test]
+    fn a_wide_site_hides_no_beam() {
+        let mut scene = hall([9.95, 10.05], [9.95, 10.05]);
+        let ground = [[-300.0, -300.0], [300.0, -300.0], [300.0, 300.0], [-300.0, 300.0]];
+        scene.add_quad("ground", 0, ground.map(|[x, y]| DVec3::new(x, y, -0.1)));
+        assert!((lit(&scene) - 0.01).abs() < 0.0005, "{}", lit(&scene));
+    }
+
+    /// Of two spots side by side each is told once.
+    #[test]
+    fn spots_beside_each_other_are_told_once() {
+        let mut scene = hall([9.95, 10.05], [9.9, 10.1]);
+        let bar = [[9.9, 9.99], [9.9, 10.03], [10.1, 10.03], [10.1, 9.99]];
+        scene.add_quad("bar", 0, bar.map(|[x, y]| DVec3::new(x, y, 10.1)));
+        let lit = lit(&scene);
+        assert!((lit - 0.016).abs() < 0.0006, "{lit}");
+    }
+
     fn lit(scene: &Scene) -> f64 {
         let mesh = Mesh::new(scene);
         let tracer = Tracer::new(scene, &mesh);
@@ -539,11 +625,12 @@ mod tests {
                 let [x, y] = beam.axes;
                 beam.axes = [cos * x + sin * y, cos * y - sin * x];
                 beam.widths = [0.02; 2];
-                let beam = beam.clone().grown(&tracer, beam.middle().point, 1.0).unwrap();
-                let rectangles = beam.rectangles();
-                assert!(rectangles.len() <= RECTANGLES);
+                let beam = beam.clone().grown((&tracer, &[]), beam.middle().point, 1.0).unwrap();
+                let rectangles = beam.rectangles(8);
+                assert!(rectangles.len() <= 8);
                 let area = |[a, b, _, d]: &[DVec3; 4]| (*b - *a).cross(*d - *a).length();
-                let lit: f64 = rectangles.iter().map(|(corners, lit)| lit * area(corners)).sum();
+                let share = |r: &Rectangle| r.cells.iter().map(|c| f64::from(c.share)).sum::<f64>() / r.count;
+                let lit: f64 = rectangles.iter().map(|r| share(r) * area(&r.corners)).sum();
                 assert!((lit - beam.lit()).abs() < 1e-9 * lit, "{lit}, {}", beam.lit());
             }
         }

@@ -23,7 +23,7 @@ pub mod tree;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 mod walk;
 
-pub use beams::{Beam, Beams};
+pub use beams::{Beam, Beams, Rectangle};
 pub use brute::{blocked_brute, closest_brute, closest_where_brute};
 pub use emitters::{Emitter, EmitterTree};
 pub use importance::narrowed;

@@ -262,7 +262,16 @@ impl<'a> Tracer<'a> {
             + size_of_val(&*self.eyes)
     }
 
-    /// What lamps without area light through small openings, looked for when it is first asked for.
+    /// Whether anything lets a part of the light pass, by chance for each ray.
+    pub(crate) fn has_panes(&self) -> bool {
+        let is_pane = |t: usize| {
+            let material = self.scene.material(self.mesh.source[t] as usize);
+            self.kind[t].see_through && material.alpha_mode == AlphaMode::Blend
+        };
+        !self.all_opaque && (0..self.kind.len()).any(is_pane)
+    }
+
+    /// What lamps without area light through small openings, looked for when it is first asked for: not from within parallel work, which would wait for itself.
     pub fn beams(&self) -> &Beams {
         self.beams.get_or_init(|| Beams::find(self))
     }

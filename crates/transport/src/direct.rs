@@ -43,8 +43,9 @@ pub struct Shadowing {
 /// without any, −0.50 % with one, −0.43 % with four.
 const OPEN: u32 = 2;
 
-/// Places of a receiver at which light of narrow beams is looked at.
+/// Places of a receiver at which light of narrow beams is looked at, and others that are tried for one where there is none.
 const BEAM_ENDS: f64 = 16.0;
+const SPARE: u32 = 64;
 
 /// The stream of sample points that these rays use.
 const OPENNESS: u32 = 0x02f0;
@@ -194,11 +195,12 @@ impl Luminaires {
             self.columns_so_far(tracer, receivers, shadowing, |chunk| hash(chunk as u32), progress);
         let kept = columns.lights;
         let is_reached = |i: &usize| reached[i / CHUNK];
-        let mut sums = vec![[0f64; 3]; kept + 1];
+        let mut sums = vec![[0f64; 3]; kept + 2];
         let mut total = 0.0;
         for i in (0..receivers.len()).filter(is_reached) {
             total += weight[i];
-            for (sum, e) in sums.iter_mut().zip(columns.seen_by_light(i).iter().chain([&columns.all[i].mean])) {
+            let of_all = [&columns.all[i].mean, &columns.all[i].carried];
+            for (sum, e) in sums.iter_mut().zip(columns.seen_by_light(i).iter().chain(of_all)) {
                 (0..3).for_each(|band| sum[band] += weight[i] * f64::from(e[band]));
             }
         }
@@ -206,7 +208,8 @@ impl Luminaires {
             sums.into_iter().map(|sum| sum.map(|sum| (sum / f64::max(total, f64::MIN_POSITIVE)) as f32)).collect();
         for i in (0..receivers.len()).filter(|i| !is_reached(i)) {
             columns.seen[i * kept..][..kept].copy_from_slice(&means[..kept]);
-            columns.all[i] = Column { mean: means[kept], is_shaded: true, is_sampled: true, ..Column::default() };
+            let [mean, carried] = [kept, kept + 1].map(|k| means[k]);
+            columns.all[i] = Column { mean, carried, is_shaded: true, is_sampled: true };
         }
         columns
     }
@@ -272,7 +275,7 @@ impl Luminaires {
                             sums[band] += weight * visible[l][band];
                             sums[band + 3] += weight * open * visible[l][band];
                         }
-                        if self.carries_on(tracer, l, place) {
+                        if kept > 0 && self.carries_on(tracer, l, place) {
                             (0..3).for_each(|band| carried[band] += weight * open * visible[l][band]);
                         }
                     }
@@ -329,8 +332,9 @@ impl Luminaires {
                 }
                 let mut at = [(); 2].map(|()| vec![None; shadowing.places as usize]);
                 for set in 1..3 {
-                    scratch.look(tracer, receivers, (i, set), shadowing.rays, |index, _, visible| {
-                        let sum = visible.iter().map(|e| luminance_of(*e)).sum::<f64>();
+                    scratch.look(tracer, receivers, (i, set), shadowing.rays, |index, spot, visible| {
+                        let goes_on = |l: &usize| !self.carries_on(tracer, *l, &spot.place);
+                        let sum = (0..visible.len()).filter(goes_on).map(|l| luminance_of(visible[l])).sum::<f64>();
                         at[set as usize - 1][index] = Some(sum);
                     });
                     let is_alike = matches!(scratch.outcomes & !SAMPLED, LIT | DARK);
@@ -356,7 +360,7 @@ impl Luminaires {
         Ok(variation)
     }
 
-    /// One unbiased sample of the irradiance of a place from one light, less what other lights carry on; `parts` is room to work it out.
+    /// One unbiased sample of the irradiance of a place from one light; `parts` is room to work it out.
     pub(crate) fn sample<'l>(
         &'l self,
         light: usize,
@@ -365,9 +369,6 @@ impl Luminaires {
         seed: u32,
         parts: &mut Parts<'l>,
     ) -> [f64; 3] {
-        if self.carries_on(tracer, light, place) {
-            return [0.0; 3];
-        }
         parts.find_one(self, light, place);
         let Some((part, probability)) = parts.pick(unit(hash(seed))) else { return [0.0; 3] };
         let sequence = Sequence::new(seed, DIRECT + 1 + light as u32);
@@ -417,7 +418,7 @@ impl Luminaires {
             // Next to a lamp it is however few rays there would be: some such elements may send half of the light.
             is_worth_a_look || !is_smooth(*part) && is_clear(u32::MAX)
         });
-        // How light varies is asked of what goes on from elements, not of the ends of beams.
+        // How light varies is asked of what goes on from elements, which the ends of beams do not.
         let ends = if asked == Asked::Mean { site.beam_ends(tracer, self) } else { Vec::new() };
         if told.is_some() && ends.is_empty() {
             (*is_whole, *is_told) = (true, true);
@@ -428,7 +429,11 @@ impl Luminaires {
                 (site.place(x, y), 1.0 / f64::from(count))
             }));
             if !ends.is_empty() {
-                self.add_ends(tracer, &ends, nodes);
+                let spare = (count..count + SPARE).map(|index| {
+                    let [_, _, x, y] = places.point(index);
+                    site.place(x, y)
+                });
+                self.add_ends((tracer, spare), (&ends, unit(hash(seed))), nodes);
             }
         }
         for (index, (place, weight)) in (0..).zip(&*nodes) {
@@ -446,15 +451,25 @@ impl Luminaires {
         }
     }
 
-    /// Adds places where beams end to those of a receiver, which then stand for the rest of it.
-    fn add_ends(&self, tracer: &Tracer, ends: &[(Place, f64)], nodes: &mut Vec<(Place, f64)>) {
-        nodes.retain(|(place, _)| !self.beams_on(tracer, place.triangle).any(|beam| beam.holds(place)));
+    /// Adds places where beams end to those of a receiver, which then stand for the rest of it; one of some to spare does where none of them is left. The
+    /// sum over what is lit begins at an offset in [0, 1).
+    fn add_ends(
+        &self,
+        (tracer, spare): (&Tracer, impl Iterator<Item = Place>),
+        (ends, offset): (&[(Place, f64)], f32),
+        nodes: &mut Vec<(Place, f64)>,
+    ) {
+        let is_free = |place: &Place| !self.beams_on(tracer, place.triangle).any(|beam| beam.holds(place));
+        nodes.retain(|(place, _)| is_free(place));
+        if nodes.is_empty() {
+            nodes.extend(spare.into_iter().find(is_free).map(|place| (place, 0.0)));
+        }
         let lit: f64 = ends.iter().map(|(_, share)| share).sum();
         let rest = nodes.len() as f64;
         let share = if nodes.is_empty() { 1.0 } else { lit.min(1.0) };
         nodes.iter_mut().for_each(|(_, weight)| *weight = (1.0 - share) / rest);
         // Of cells by what is lit of them, as many places as are to be.
-        let (mut reached, step) = (0.5, BEAM_ENDS / lit);
+        let (mut reached, step) = (f64::from(offset), BEAM_ENDS / lit);
         for (place, own) in ends {
             let before = f64::floor(reached);
             reached += own * step;

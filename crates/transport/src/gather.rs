@@ -407,14 +407,16 @@ impl<'a> Caster<'_, 'a> {
                 }
             }
             let element = gather.returned(at, id, &mut throughput, &mut place, seed);
+            // What comes through a sheet no other light carries on.
+            let is_whole = element != id;
             if throughput.iter().all(|t| *t <= 0.0) {
                 return sum;
             }
             seed = hash(seed.wrapping_add(0x9e37_79b9));
             let [u, v, pick] = drawn;
             let direct = match &self.glance {
-                Some(glance) => glance.irradiance(gather.tracer, &place, (pick, seed)),
-                None => gather.one_light(&place, element as usize, (pick, seed), parts),
+                Some(glance) => glance.irradiance(gather.tracer, (&place, is_whole), (pick, seed)),
+                None => gather.one_light((&place, is_whole), element as usize, (pick, seed), parts),
             };
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
             let End { light, spot, .. } = self.end(&Hemisphere::new(gather.tracer, &place).towards([u, v]), seed);
@@ -447,12 +449,21 @@ impl<'a> Gather<'a> {
         opposite
     }
 
-    /// Direct irradiance at a spot of an element: what the element received, and by how much one light differs from that at
+    /// Direct irradiance at a spot of an element, less what other lights carry on unless the whole is asked for: what the element received, and by how much one light differs from that at
     /// the spot, picked after what it gave the element. Where light is even, that is next to nothing.
-    fn one_light(&self, spot: &Place, element: usize, (u, seed): (f32, u32), parts: &mut Parts<'a>) -> [f64; 3] {
+    fn one_light(
+        &self,
+        (spot, is_whole): (&Place, bool),
+        element: usize,
+        (u, seed): (f32, u32),
+        parts: &mut Parts<'a>,
+    ) -> [f64; 3] {
         let received = self.columns.seen_by_light(element);
         let (pick, probability) = pick_light(received, f64::from(u));
-        let here = self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4), parts);
+        let here = match !is_whole && self.luminaires.carries_on(self.tracer, pick, spot) {
+            true => [0.0; 3],
+            false => self.luminaires.sample(pick, self.tracer, spot, hash(seed ^ 0x4), parts),
+        };
         let mut direct = [0f64; 3];
         received.iter().for_each(|e| (0..3).for_each(|band| direct[band] += f64::from(e[band])));
         std::array::from_fn(|band| direct[band] + (here[band] - f64::from(received[pick][band])) / probability)

@@ -85,8 +85,8 @@ impl<'l> Glance<'l> {
         Some(Glance { origin, lanes, pieces, points, luminaires })
     }
 
-    /// Irradiance of a spot, lux per band, by one look at a lamp that u in [0, 1) picks, less what other lights carry on.
-    pub fn irradiance(&self, tracer: &Tracer, spot: &Place, (u, seed): (f32, u32)) -> [f64; 3] {
+    /// Irradiance of a spot, lux per band, by one look at a lamp that u in [0, 1) picks, less what other lights carry on unless the whole is asked for.
+    pub fn irradiance(&self, tracer: &Tracer, (spot, is_whole): (&Place, bool), (u, seed): (f32, u32)) -> [f64; 3] {
         let mut weights = [0f32; MOST];
         for (lanes, weights) in self.lanes.iter().zip(weights.chunks_exact_mut(LANES)) {
             weights.copy_from_slice(
@@ -118,7 +118,7 @@ impl<'l> Glance<'l> {
         let Some((k, probability)) = picked else { return [0.0; 3] };
         let Some(piece) = self.pieces.get(k) else {
             let number = k - self.pieces.len();
-            if self.luminaires.is_end(tracer, number, spot) {
+            if !is_whole && self.luminaires.is_end(tracer, number, spot) {
                 return [0.0; 3];
             }
             let (e, _) = from_point(self.points[number], tracer, spot, 1, seed);
@@ -217,7 +217,8 @@ mod tests {
             let (direction, _, arriving) = scene.lights[0].arrival(spot.point);
             let of_point = direction.dot(normal).max(0.0) * f64::from(arriving[1]);
             let exact = glance.pieces.iter().map(factor).sum::<f64>() + of_point;
-            let look = |i: u32| glance.irradiance(&tracer, &spot, ((i as f32 + 0.5) / LOOKS as f32, hash(i)))[1];
+            let look =
+                |i: u32| glance.irradiance(&tracer, (&spot, false), ((i as f32 + 0.5) / LOOKS as f32, hash(i)))[1];
             let looks: Vec<f64> = (0..LOOKS).map(look).collect();
             let n = f64::from(LOOKS);
             let mean = looks.iter().sum::<f64>() / n;

@@ -11,8 +11,6 @@ use std::ops::Range;
 
 mod beams;
 
-pub use beams::BEAMS;
-
 /// A source whose exitance is at most this multiple of the scene's mean goes through the rows, where it costs
 /// nothing extra: its noise there is no more than that of ordinary reflected light. The mean is over all surfaces, or over
 /// half of the box around these and all eyes where that is more: rays from afar would meet a lone lamp too seldom.

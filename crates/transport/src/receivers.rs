@@ -6,7 +6,7 @@ use crate::{Exposure, Luminaires};
 use glam::{DVec2, DVec3};
 use radiosity_scene::elements::triangle_from_square;
 use radiosity_scene::{Elements, Mesh};
-use radiosity_trace::{Place, Tracer};
+use radiosity_trace::{Beam, Place, Tracer};
 use smallvec::SmallVec;
 
 /// Places keep off the border of their element by about this many welding tolerances (millionths of the scene).
@@ -99,7 +99,13 @@ impl Site {
             return Vec::new();
         }
         let exposed = self.area() * f64::from(self.mask.count_ones()) / 64.0;
-        let beams = luminaires.beams_on(tracer, self.triangle);
+        let corners = [DVec3::ZERO, self.edges[0], self.edges[1]].map(|edge| self.origin + edge);
+        let bounds = corners[1..].iter().fold([corners[0]; 2], |[low, high], p| [low.min(*p), high.max(*p)]);
+        let is_about = |beam: &&Beam| {
+            let [low, high] = beam.bounds();
+            low.cmple(bounds[1]).all() && high.cmpge(bounds[0]).all()
+        };
+        let beams = luminaires.beams_on(tracer, self.triangle).filter(is_about);
         let mut ends = Vec::new();
         for (k, beam) in beams.clone().enumerate() {
             let place = |point| Place { point, normal: self.normal_at(point), triangle: self.triangle };

@@ -1,4 +1,4 @@
-//! The referee: an unbiased path tracer of irradiance, sharing nothing with the engine but rays (catalogue 3, 70).
+//! The referee: an unbiased path tracer of irradiance, sharing nothing with the engine but rays and where narrow beams end (catalogue 3, 70).
 //!
 //! E(x) = Σ over light samples + Σ over one cosine-distributed ray that carries on from what it meets; emitters are
 //! found both ways and weighted by the balance heuristic (Veach 1997, §9.2); paths end by roulette, and where they meet a
@@ -13,7 +13,7 @@
 //! an office they have 1.75 and 1.5 times as much after two thirds of the time.
 //!
 //! Where lamps without area light something through a small opening, the end of the beam is itself a lamp to all that sees it: it is sampled by
-//! area and weighted against the paths that meet it by chance (`beams.rs`).
+//! area and weighted against the paths that meet it by chance (`beams.rs`). Of beams that were not found neither the engine nor this knows but by chance.
 
 use beams::BeamEnds;
 use glam::{DVec2, DVec3};

@@ -136,6 +136,7 @@ impl<'a> Solution<'a> {
             footprint::solution(tracer, elements, lights).saturating_add(options.stored(cells, elements))
         };
         let begin = |elements: usize| Begin { monitor, is_soon: elements <= FEW };
+        stages.time(monitor, "beams", || tracer.beams());
         let elements = stages.time(monitor, "elements", || {
             let cells = Elements::new(scene, mesh, width);
             let cells = if options.looked_up { cells.shared(&width) } else { cells };

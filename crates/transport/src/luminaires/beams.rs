@@ -3,47 +3,63 @@
 //! Rows of rays meet a sun spot of a hand's breadth in a hall too seldom, and all the light of the hall may come from it. So it is what a small bright
 //! lamp is: its light goes to all receivers directly, and no row has it as well.
 
-use super::{Luminaires, Piece, area_light};
+use super::{Light, Luminaires, Piece, area_light};
 use crate::one_light::{geometry, luminance_of};
 use crate::parts::Parts;
-use glam::{DVec2, DVec3};
-use radiosity_scene::{Elements, Mesh, luminance};
+use glam::DVec3;
+use radiosity_scene::{Bands, Elements, Mesh, luminance};
+use radiosity_trace::beams::Cell;
 use radiosity_trace::sampling::hash;
-use radiosity_trace::{Beam, Place, Tracer};
+use radiosity_trace::{Beam, Place, Rectangle, Tracer};
 use rayon::prelude::*;
-
-/// Name of the light that they are.
-pub const BEAMS: &str = "ends of narrow beams";
 
 /// They are none where more than this part of their cells is lit: elements tell that themselves, and are exact from nearby, too.
 const LEAST_LIT: f64 = 0.7;
 
+/// Nor, of many, the weakest, which give this part of what all of them do. Among shelves there are dozens of slivers of light.
+const LEFT: f64 = 0.03;
+
+/// Rectangles that they are all together, if that leaves one for each. More would be a light with a tree, which takes longer, and gathers could not glance at all lamps.
+const RECTANGLES: usize = 24;
+
 /// Nor where they give less than this part of what other lights give to what they light.
-const NEGLIGIBLE: f64 = 0.05;
+const NEGLIGIBLE: f64 = 0.02;
 
 impl Luminaires {
     /// With the ends of narrow beams as one more light, the last, if there are any.
     pub fn with_beams(mut self, tracer: &Tracer, elements: &Elements) -> Luminaires {
         let beams = tracer.beams().all();
-        let is_light =
-            |beam: &Beam| share_of_cells(beam, tracer.mesh, elements) < LEAST_LIT && self.stands_out(tracer, beam);
-        let is_light: Vec<bool> = beams.par_iter().map(is_light).collect();
+        let flux = |beam: &Beam| -> f64 {
+            let is_light = share_of_cells(beam, tracer.mesh, elements) < LEAST_LIT && self.stands_out(tracer, beam);
+            if is_light { flux_of(tracer, beam) } else { 0.0 }
+        };
+        let flux: Vec<f64> = beams.par_iter().map(flux).collect();
+        let mut strongest: Vec<usize> = (0..beams.len()).filter(|number| flux[*number] > 0.0).collect();
+        strongest.sort_by(|a, b| flux[*b].total_cmp(&flux[*a]));
+        let mut left = (1.0 - LEFT) * flux.iter().sum::<f64>();
+        let mut is_light = vec![false; beams.len()];
+        for number in strongest {
+            if left > 0.0 {
+                is_light[number] = true;
+                left -= flux[number];
+            }
+        }
         let own = beams.iter().zip(&is_light).filter(|(_, is_light)| **is_light);
-        let pieces: Vec<Piece> = own.flat_map(|(beam, _)| pieces(tracer, beam)).collect();
+        let most = (RECTANGLES / own.clone().count().max(1)).max(1);
+        let pieces: Vec<Piece> = own.flat_map(|(beam, _)| pieces(tracer, beam, most)).collect();
         if pieces.is_empty() {
             return self;
         }
         self.beams = is_light;
         let mut lights = std::mem::take(&mut self.lights);
-        lights.push(area_light(BEAMS.to_owned(), pieces));
+        lights.push(area_light(String::new(), pieces));
         self.with(lights)
     }
 
     /// Whether the end of a beam is not outshone by other lights where its own light goes.
     fn stands_out(&self, tracer: &Tracer, beam: &Beam) -> bool {
         let end = beam.middle();
-        let power = |piece: &Piece| piece.area * f64::from(luminance(piece.exitance));
-        let flux: f64 = pieces(tracer, beam).iter().map(power).sum();
+        let flux = flux_of(tracer, beam);
         let mut parts = Parts::default();
         let (mut own, mut others) = (0.0, 0.0);
         for (k, (_, place)) in (0..).zip(beam.sights(tracer)) {
@@ -52,6 +68,11 @@ impl Luminaires {
             others += (0..self.lights.len()).map(of_light).sum::<f64>();
         }
         own > NEGLIGIBLE * others
+    }
+
+    /// All lights but the ends of beams.
+    pub fn lamps(&self) -> &[Light] {
+        &self.lights[..self.lights.len() - usize::from(!self.beams.is_empty())]
     }
 
     /// The ends of beams that are a light, of those on a triangle.
@@ -81,30 +102,37 @@ impl Luminaires {
     }
 }
 
+/// What the end of a beam gives back, lm.
+fn flux_of(tracer: &Tracer, beam: &Beam) -> f64 {
+    let power = |piece: &Piece| piece.area * f64::from(luminance(piece.exitance));
+    pieces(tracer, beam, 1).iter().map(power).sum()
+}
+
 /// The end of a beam as triangles that shine by what the surface gives back.
-fn pieces(tracer: &Tracer, beam: &Beam) -> Vec<Piece> {
-    let (scene, mesh) = (tracer.scene, tracer.mesh);
+fn pieces(tracer: &Tracer, beam: &Beam, most: usize) -> Vec<Piece> {
+    let (scene, mesh, triangle) = (tracer.scene, tracer.mesh, beam.triangle as usize);
     let light = &scene.lights[beam.light as usize];
-    let of_rectangle = |(corners, lit): ([DVec3; 4], f64)| {
-        let middle = 0.5 * (corners[0] + corners[2]);
-        let uv = mesh.barycentric(beam.triangle as usize, middle).clamp(DVec2::ZERO, DVec2::ONE);
-        let at = mesh.surface(beam.triangle as usize, uv);
+    let given = |cell: &Cell| -> Bands {
+        let at = mesh.surface(triangle, mesh.barycentric(triangle, cell.lit));
+        let (towards, _, arriving) = light.arrival(cell.lit);
+        let falling = scene.opacity(at) * cell.share * towards.dot(beam.normal).max(0.0) as f32;
         let reflectance = scene.reflectance(at);
-        let (towards, _, arriving) = light.arrival(middle);
-        let falling = f64::from(scene.opacity(at)) * lit * towards.dot(beam.normal).max(0.0);
-        let exitance = std::array::from_fn(|band| (falling * f64::from(reflectance[band] * arriving[band])) as f32);
+        std::array::from_fn(|band| falling * reflectance[band] * arriving[band])
+    };
+    let of_rectangle = |Rectangle { corners, cells, count }: Rectangle| {
+        let sum = cells.iter().map(given).fold([0f64; 3], |sum, m| std::array::from_fn(|k| sum[k] + f64::from(m[k])));
         let [a, b, c, d] = corners;
         [[a, b, c], [a, c, d]].map(|corners| Piece {
             triangle: beam.triangle,
             side: beam.side,
             corners,
             normal: beam.normal,
-            exitance,
+            exitance: sum.map(|m| (m / count) as f32),
             area: 0.5 * (b - a).cross(d - a).length(),
             varied: false,
         })
     };
-    beam.rectangles().into_iter().flat_map(of_rectangle).collect()
+    beam.rectangles(most).into_iter().flat_map(of_rectangle).collect()
 }
 
 /// Which part is lit of the cells that a beam ends on.
