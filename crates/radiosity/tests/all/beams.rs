@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use radiosity::{
-    Material, MeasureOptions, Mesh, Place, PointLight, PointLightKind, Referee, Scene, Tracer, Up, luminance, measure,
+    Material, MeasureOptions, Mesh, Place, PointLight, PointLightKind, Referee, Scene, Tracer, Transmission, Up,
+    luminance, measure,
 };
 use std::f64::consts::PI;
 
@@ -111,4 +112,37 @@ fn a_grey_hall_is_lit_by_a_spot_again_and_again() {
         let (truth, found) = (luminance(referee.irradiance(&place, 1 << 16, 3)), luminance(*found));
         assert!((found - truth).abs() <= 0.03 * truth, "{place:?}: {found} lx, {truth} lx");
     }
+}
+
+/// A beam that ends on an opal sheet: what the sheet gives back shines as a light, and what it lets through does not.
+#[test]
+fn a_sheet_lets_the_light_of_a_spot_through_once() {
+    let mut scene = hall([9.85, 10.15], [9.85, 10.15], true, light(PointLightKind::Directional, 1e6));
+    let transmission = Transmission { transmittance: [0.4; 3], texture: None, replaced: 0.0, share_texture: None };
+    scene.materials.push(Material {
+        base_color: [0.4, 0.4, 0.4, 1.0],
+        transmission: Some(transmission),
+        double_sided: true,
+        ..Material::default()
+    });
+    let sheet = [[8.0, 8.0], [12.0, 8.0], [12.0, 12.0], [8.0, 12.0]].map(|[x, y]| DVec3::new(x, y, 1.0));
+    scene.add_quad("sheet", 2, sheet);
+    let mesh = Mesh::new(&scene);
+    let tracer = Tracer::new(&scene, &mesh);
+    assert!(
+        tracer
+            .beams()
+            .all()
+            .iter()
+            .all(|beam| scene.objects[scene.triangle_object[mesh.source[beam.triangle as usize] as usize] as usize]
+                .name
+                == "sheet")
+    );
+    let referee = Referee::new(&tracer);
+    let (point, normal) = (DVec3::new(10.05, 9.9, 0.9), DVec3::Z);
+    let options = MeasureOptions { error: 0.02, ..MeasureOptions::default() };
+    let measured = measure(&tracer, &[(point, normal)], &options, &()).unwrap();
+    let truth = luminance(referee.irradiance(&Place { point, normal, triangle: u32::MAX }, 1 << 16, 3));
+    let found = luminance(measured.irradiance[0]);
+    assert!((found - truth).abs() <= 0.04 * truth, "{found} lx, {truth} lx");
 }
