@@ -68,7 +68,7 @@ pub struct Beam {
     pub light: u32,
     /// Mesh triangle.
     pub triangle: u32,
-    /// Its side that is lit, and the unit normal of that.
+    /// Its side that is lit.
     pub side: Side,
     /// Unit normal of that side.
     pub normal: DVec3,
@@ -93,11 +93,11 @@ pub struct Rectangle {
     pub count: f64,
 }
 
-/// A square of a [`Beam`].
+/// A rectangle of the grid of a [`Beam`].
 #[derive(Clone, Copy, Debug)]
 pub struct Cell {
     at: [i32; 2],
-    /// Part of the square that is lit.
+    /// Part of it that is lit.
     pub share: f32,
     /// A place that is.
     pub lit: DVec3,
