@@ -25,6 +25,9 @@ const REACH: f64 = 4.0;
 const SHORT: f64 = 1.0 / (1 << 18) as f64;
 const CLEAR: f64 = 3.0;
 
+/// Less than this part of a view is not looked for behind what fills the rest.
+const LEAST_SEEN: f32 = 1.0 / 256.0;
+
 /// Cosine above which surfaces lie flat on each other.
 const FLAT: f32 = 0.999;
 
@@ -370,12 +373,30 @@ impl<'a> Tracer<'a> {
         if is_met(&&hit) { hit } else { met.iter().find(is_met).copied().unwrap_or(hit) }
     }
 
-    /// The first surface that a viewer sees: backs of one-sided surfaces are passed, as viewers cull them.
-    pub fn seen(&self, ray: &Ray, seed: u32) -> Found {
-        let hit = self.tree.closest_where(ray, |t, u, v, back| {
-            (!back || self.kind[t as usize].double_sided) && self.stops(t, u, v, seed)
-        });
-        hit.map_or(Found::Escaped, |hit| self.found(hit))
+    /// What a viewer sees along a ray, one surface behind the other as far as they let light through, and the part of the view that each fills: all parts
+    /// are one together. Backs of one-sided surfaces are passed, as viewers cull them.
+    pub fn seen(&self, ray: &Ray, mut visit: impl FnMut(Found, f32)) {
+        let mut left = 1.0;
+        let mut passed: SmallVec<[u32; 4]> = SmallVec::new();
+        while left > 0.0 {
+            let hit = self.tree.closest_where(ray, |t, u, v, back| {
+                let Kind { double_sided, see_through, .. } = self.kind[t as usize];
+                let is_left = || !passed.contains(&self.sheet[t as usize]) && self.opacity(t, u, v) > 0.0;
+                (!back || double_sided) && (!see_through || is_left())
+            });
+            let Some(hit) = hit else { return visit(Found::Escaped, left) };
+            let Hit { triangle, u, v, .. } = hit;
+            let see_through = self.kind[triangle as usize].see_through;
+            let opacity = if see_through { self.opacity(triangle, u, v).min(1.0) } else { 1.0 };
+            let behind = left * (1.0 - opacity);
+            let is_last = behind < LEAST_SEEN;
+            visit(self.found(hit), if is_last { left } else { left - behind });
+            if is_last {
+                return;
+            }
+            left = behind;
+            passed.push(self.sheet[triangle as usize]);
+        }
     }
 
     /// The place that a ray met, on the side that it met; none but of surfaces.
@@ -469,12 +490,15 @@ impl<'a> Tracer<'a> {
         Found::Surface { triangle, uv: [u, v], side: if back { Side::Back } else { Side::Front }, distance: t }
     }
 
+    fn opacity(&self, triangle: u32, u: f32, v: f32) -> f32 {
+        self.scene.opacity(self.mesh.surface(triangle as usize, DVec2::new(f64::from(u), f64::from(v))))
+    }
+
     fn stops(&self, triangle: u32, u: f32, v: f32, seed: u32) -> bool {
         if !self.kind[triangle as usize].see_through {
             return true;
         }
-        let at = self.mesh.surface(triangle as usize, DVec2::new(f64::from(u), f64::from(v)));
-        let opacity = self.scene.opacity(at);
+        let opacity = self.opacity(triangle, u, v);
         opacity >= 1.0 || (opacity > 0.0 && unit(hash(seed ^ hash(self.sheet[triangle as usize]))) < opacity)
     }
 }

@@ -11,6 +11,9 @@ use radiosity_scene::{Bands, Camera, Side, luminance};
 use radiosity_trace::{Found, Place, Tracer};
 use rayon::prelude::*;
 
+/// Part of a pixel below which nothing is left of it.
+const LEAST_REST: f32 = 1e-5;
+
 /// Samples along each side of a pixel.
 const GRID: u32 = 4;
 
@@ -135,8 +138,8 @@ impl ViewRays {
                 rest -= if seen.behind { 0.0 } else { seen.share };
             }
             begin += of_pixel.len();
-            // Shares are multiples of that of a sample.
-            if rest > 0.5 / (self.grid * self.grid) as f32 {
+            // Less is rounding: a part of a sample fills more.
+            if rest > LEAST_REST {
                 parts.push(Part { pixel, share: rest, luminance: self.sky[pixel as usize] });
             }
             if parts.len() == first + 1 {
@@ -160,13 +163,14 @@ impl Frame {
             let (x, y) = ((f64::from(column) + x) / f64::from(width), (f64::from(row) + y) / f64::from(height));
             let (origin, direction) = camera.ray(2.0 * x - 1.0, 1.0 - 2.0 * y, aspect);
             let scene = tracer.scene;
-            match tracer.seen(&tracer.free_ray(origin, direction), pixel * grid * grid + sample) {
+            tracer.seen(&tracer.free_ray(origin, direction), |found, part| match found {
                 Found::Back => {}
                 Found::Escaped => {
                     let luminance = scene.sky.luminance(direction, scene.up.direction());
-                    (0..3).for_each(|band| sky[band] += share * luminance[band]);
+                    (0..3).for_each(|band| sky[band] += part * share * luminance[band]);
                 }
                 Found::Surface { triangle, uv, side, .. } => {
+                    let share = part * share;
                     let uv = DVec2::new(f64::from(uv[0]), f64::from(uv[1]));
                     let at = tracer.mesh.surface(triangle as usize, uv);
                     let emitted = scene.emitted_luminance(at).map(|luminance| share * luminance);
@@ -183,7 +187,7 @@ impl Frame {
                         surface(sample(side.other(), transmittance, true, [0.0; 3]));
                     }
                 }
-            }
+            });
         }
         sky
     }
@@ -323,7 +327,7 @@ const BAYER: [[u8; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use radiosity_scene::{Material, Mesh, Scene};
+    use radiosity_scene::{AlphaMode, Material, Mesh, Scene, Sky, Up};
 
     /// A square of the given material under an eye at the given angle from its normal, half a metre away.
     fn square_seen(material: Material, angle: f64, irradiance: f32) -> Vec<Bands> {
@@ -450,5 +454,45 @@ mod tests {
             rest = others;
         }
         assert!(rest.is_empty());
+    }
+
+    /// A pane over a floor is as much of every pixel as it is opaque, without any chance, and the sky above it as much as it lets through.
+    #[test]
+    fn panes_fill_their_part_of_every_pixel() {
+        let of = |alpha: f32, emissive: f32| Material {
+            base_color: [0.0, 0.0, 0.0, alpha],
+            emissive: [emissive; 3],
+            alpha_mode: if alpha < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
+            double_sided: true,
+            ..Material::default()
+        };
+        let square = |half: f64, z: f64| {
+            [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, y]| DVec3::new(x, y, z))
+        };
+        let mut scene = Scene { materials: vec![of(1.0, 10.0), of(0.3, 100.0)], up: Up::Z, ..Scene::default() };
+        scene.sky = Sky::Uniform([1000.0; 3]);
+        scene.add_quad(
+            "floor",
+            0,
+            [[-5.0, -5.0], [0.0, -5.0], [0.0, 5.0], [-5.0, 5.0]].map(|[x, y]| DVec3::new(x, y, 0.0)),
+        );
+        scene.add_quad("pane", 1, square(5.0, 1.0));
+        scene.add_quad("pane", 1, square(5.0, 1.5));
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let camera = Camera::look_at("eye", DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::Y, 0.6);
+        let view = ViewRays::new(&tracer, &camera, 24, 24);
+        let picture = view.picture(&vec![[0.0; 3]; view.seen.len()]);
+        // Two panes, each 0.3 of what is seen there.
+        let over = |behind: f32| 30.0 + 0.7 * (30.0 + 0.7 * behind);
+        let is = |pixel: &Bands, behind: f32| (pixel[1] - over(behind)).abs() < 1e-3 * over(behind);
+        let (floor, sky) = (
+            picture.pixels.iter().filter(|p| is(p, 10.0)).count(),
+            picture.pixels.iter().filter(|p| is(p, 1000.0)).count(),
+        );
+        assert_eq!((floor + sky, floor.min(sky) > 200), (24 * 24, true), "{floor} {sky}");
+        for part in picture.parts.chunk_by(|a, b| a.pixel == b.pixel) {
+            assert!((part.iter().map(|p| p.share).sum::<f32>() - 1.0).abs() < 1e-4);
+        }
     }
 }
