@@ -276,15 +276,15 @@ impl Luminaires {
                             sums[band + 3] += weight * open * visible[l][band];
                         }
                         if kept > 0 && self.carries_on(tracer, l, place) {
+                            let open = if all_open > 0.0 { *open } else { 1.0 };
                             (0..3).for_each(|band| carried[band] += weight * open * visible[l][band]);
                         }
                     }
                     for band in 0..3 {
                         let over_area = sums[band] / f64::max(whole, f64::MIN_POSITIVE);
                         column.mean[band] += over_area as f32;
-                        if all_open > 0.0 {
-                            column.carried[band] += (carried[band] / all_open) as f32;
-                        }
+                        let all = if all_open > 0.0 { all_open } else { whole };
+                        column.carried[band] += (carried[band] / f64::max(all, f64::MIN_POSITIVE)) as f32;
                         if let Some(seen) = seen.get_mut(k * kept + l) {
                             seen[band] = if all_open > 0.0 { sums[band + 3] / all_open } else { over_area } as f32;
                         }

@@ -449,8 +449,8 @@ impl<'a> Gather<'a> {
         opposite
     }
 
-    /// Direct irradiance at a spot of an element, less what other lights carry on unless the whole is asked for: what the element received, and by how much one light differs from that at
-    /// the spot, picked after what it gave the element. Where light is even, that is next to nothing.
+    /// Direct irradiance at a spot of an element, less what other lights carry on unless the whole is asked for: what the element received, and by how much
+    /// one light differs from that at the spot, picked after what it gave the element. Where light is even, that is next to nothing.
     fn one_light(
         &self,
         (spot, is_whole): (&Place, bool),
