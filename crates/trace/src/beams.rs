@@ -198,6 +198,13 @@ impl Beam {
         self.cells.binary_search_by_key(&at, |cell| cell.at).ok()
     }
 
+    /// Corners of a box around a cell.
+    pub fn around(&self, cell: usize) -> [DVec3; 2] {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let [a, b, c, d] = corners.map(|[x, y]| self.point(cell, x, y));
+        [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
+    }
+
     /// The point of a cell that (x, y) in the unit square tells; it may lie off the triangle.
     pub fn point(&self, cell: usize, x: f64, y: f64) -> DVec3 {
         self.within(self.cells[cell].at, x, y)
@@ -262,10 +269,8 @@ impl Beam {
                 };
                 self.cells = lit.into_iter().map(cell).collect();
                 self.cells.sort_unstable_by_key(|cell| cell.at);
-                let corners = self.cells.iter().flat_map(|cell| {
-                    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| self.within(cell.at, x, y))
-                });
-                self.bounds = corners.fold([from; 2], |[low, high], p| [low.min(p), high.max(p)]);
+                let boxes = (0..self.cells.len()).map(|cell| self.around(cell));
+                self.bounds = boxes.fold([from; 2], |[low, high], [a, b]| [low.min(a), high.max(b)]);
                 return Some(self);
             }
             // What is long has long cells: a slit would be lost between places that are spread over wide ones.
@@ -371,6 +376,11 @@ impl Beams {
         Beams { list: groups.par_iter().flat_map_iter(grown).collect() }
     }
 
+    /// Memory that they take, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.list) + self.list.iter().map(|beam| size_of_val(&*beam.cells)).sum::<usize>()
+    }
+
     /// All of them.
     pub fn all(&self) -> &[Beam] {
         &self.list
@@ -408,10 +418,8 @@ fn middle_of(sights: Vec<(f64, Place)>) -> f64 {
 /// Whether a lamp lights a place.
 fn reaches(tracer: &Tracer, light: &PointLight, place: &Place, seed: u32) -> bool {
     let (towards, distance, arriving) = light.arrival(place.point);
-    let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
-    towards.dot(place.normal) > 0.0
-        && luminance(arriving) > 0.0
-        && (length <= 0.0 || !tracer.blocked(&tracer.ray(place, towards, length), seed))
+    let falls = towards.dot(place.normal) > 0.0 && luminance(arriving) > 0.0;
+    falls && tracer.sees_lamp(place, (towards, distance), seed)
 }
 
 /// The edges of a mesh, and the corners of its triangles that lie opposite each.

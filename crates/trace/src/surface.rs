@@ -263,6 +263,7 @@ impl<'a> Tracer<'a> {
             + size_of_val(&*self.edge)
             + size_of_val(&*self.scales)
             + size_of_val(&*self.eyes)
+            + self.beams.get().map_or(0, Beams::bytes)
     }
 
     /// Whether anything lets a part of the light pass, by chance for each ray.
@@ -274,7 +275,8 @@ impl<'a> Tracer<'a> {
         !self.all_opaque && (0..self.kind.len()).any(is_pane)
     }
 
-    /// What lamps without area light through small openings, looked for when it is first asked for: not from within parallel work, which would wait for itself.
+    /// What lamps without area light through small openings, looked for when it is first asked for: not from within parallel work, which would wait for
+    /// itself.
     pub fn beams(&self) -> &Beams {
         self.beams.get_or_init(|| Beams::find(self))
     }
@@ -378,7 +380,7 @@ impl<'a> Tracer<'a> {
     pub fn seen(&self, ray: &Ray, mut visit: impl FnMut(Found, f32)) {
         let mut left = 1.0;
         let mut passed: SmallVec<[u32; 4]> = SmallVec::new();
-        while left > 0.0 {
+        loop {
             let hit = self.tree.closest_where(ray, |t, u, v, back| {
                 let Kind { double_sided, see_through, .. } = self.kind[t as usize];
                 let is_left = || !passed.contains(&self.sheet[t as usize]) && self.opacity(t, u, v) > 0.0;
@@ -457,6 +459,13 @@ impl<'a> Tracer<'a> {
             ControlFlow::Continue(())
         });
         all.is_continue()
+    }
+
+    /// Whether nothing stands before a lamp without area, in a direction at a distance that may be infinite.
+    #[inline]
+    pub fn sees_lamp(&self, from: &Place, (towards, distance): (DVec3, f64), seed: u32) -> bool {
+        let length = distance - self.offset;
+        length <= 0.0 || !self.blocked(&self.ray(from, towards, length), seed)
     }
 
     /// The first triangle of the quadrilateral that a triangle is a part of; itself where it is of none.

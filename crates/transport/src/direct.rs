@@ -43,10 +43,6 @@ pub struct Shadowing {
 /// without any, −0.50 % with one, −0.43 % with four.
 const OPEN: u32 = 2;
 
-/// Places of a receiver at which light of narrow beams is looked at, and others that are tried for one where there is none.
-const BEAM_ENDS: f64 = 16.0;
-const SPARE: u32 = 64;
-
 /// The stream of sample points that these rays use.
 const OPENNESS: u32 = 0x02f0;
 
@@ -429,7 +425,7 @@ impl Luminaires {
                 (site.place(x, y), 1.0 / f64::from(count))
             }));
             if !ends.is_empty() {
-                let spare = (count..count + SPARE).map(|index| {
+                let spare = (count..).map(|index| {
                     let [_, _, x, y] = places.point(index);
                     site.place(x, y)
                 });
@@ -448,35 +444,6 @@ impl Luminaires {
                 sights.share((light, panel, k), tracer, &place, rays)
             });
             spots.push(Spot { place, weight: *weight, offset, settled, outcome: 0, is_buried: None });
-        }
-    }
-
-    /// Adds places where beams end to those of a receiver, which then stand for the rest of it; one of some to spare does where none of them is left. The
-    /// sum over what is lit begins at an offset in [0, 1).
-    fn add_ends(
-        &self,
-        (tracer, spare): (&Tracer, impl Iterator<Item = Place>),
-        (ends, offset): (&[(Place, f64)], f32),
-        nodes: &mut Vec<(Place, f64)>,
-    ) {
-        let is_free = |place: &Place| !self.beams_on(tracer, place.triangle).any(|beam| beam.holds(place));
-        nodes.retain(|(place, _)| is_free(place));
-        if nodes.is_empty() {
-            nodes.extend(spare.into_iter().find(is_free).map(|place| (place, 0.0)));
-        }
-        let lit: f64 = ends.iter().map(|(_, share)| share).sum();
-        let rest = nodes.len() as f64;
-        let share = if nodes.is_empty() { 1.0 } else { lit.min(1.0) };
-        nodes.iter_mut().for_each(|(_, weight)| *weight = (1.0 - share) / rest);
-        // Of cells by what is lit of them, as many places as are to be.
-        let (mut reached, step) = (f64::from(offset), BEAM_ENDS / lit);
-        for (place, own) in ends {
-            let before = f64::floor(reached);
-            reached += own * step;
-            let count = reached.floor() - before;
-            if count > 0.0 {
-                nodes.push((*place, count * share / BEAM_ENDS));
-            }
         }
     }
 }

@@ -34,10 +34,8 @@ pub fn from_point(light: &PointLight, tracer: &Tracer, place: &Place, n: u32, sa
     if cosine <= 0.0 || luminance(arriving) <= 0.0 {
         return ([0.0; 3], 0);
     }
-    let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
-    let ray = tracer.ray(place, direction, length);
     let (n, chance) = if tracer.is_opaque() { (1, 0) } else { (n, SAMPLED) };
-    let clear = (0..n).filter(|&i| length <= 0.0 || !tracer.blocked(&ray, salt ^ hash(i))).count();
+    let clear = (0..n).filter(|&i| tracer.sees_lamp(place, (direction, distance), salt ^ hash(i))).count();
     let outcome = chance | if clear > 0 { LIT } else { 0 } | if clear < n as usize { DARK } else { 0 };
     (arriving.map(|e| f64::from(e) * cosine * clear as f64 / f64::from(n)), outcome)
 }

@@ -387,8 +387,7 @@ impl<'a> Referee<'a> {
             if cosine <= 0.0 || luminance(arriving) <= 0.0 {
                 continue;
             }
-            let length = if distance.is_finite() { distance - self.tracer.offset() } else { f64::INFINITY };
-            if length <= 0.0 || !self.tracer.blocked(&self.tracer.ray(place, direction, length), random.next_bits()) {
+            if self.tracer.sees_lamp(place, (direction, distance), random.next_bits()) {
                 // Where a beam ends, it may have been sampled from where the path came from.
                 let weight = from.map_or(1.0, |from| self.beams.weight(self.tracer, from, place, number as u32));
                 for (sum, e) in sum.iter_mut().zip(arriving) {
@@ -440,14 +439,15 @@ mod tests {
         scene
     }
 
-    /// Mean, its standard error, and the variance of one path, of the light at a place that faces upwards by `runs` runs of 1,024 paths each.
-    fn seen((scene, point): (&Scene, DVec3), from_lamps: bool, runs: u64) -> [f64; 3] {
-        let mesh = Mesh::new(scene);
-        let tracer = Tracer::new(scene, &mesh);
-        let referee = Referee { from_lamps, ..Referee::new(&tracer) };
-        let place = Place { point, normal: DVec3::Z, triangle: u32::MAX };
-        let light: Vec<f64> =
-            (0..runs).map(|run| f64::from(luminance(referee.irradiance(&place, 1024, run)))).collect();
+    pub fn opal() -> Material {
+        let transmission = Transmission { transmittance: [0.5; 3], texture: None, replaced: 0.0, share_texture: None };
+        Material { base_color: [0.4, 0.4, 0.4, 1.0], transmission: Some(transmission), ..Material::default() }
+    }
+
+    /// Mean, its standard error, and the variance of one path relative to its square, of the light at a place by `runs` runs of 1,024 paths each.
+    pub fn seen(referee: &Referee, place: &Place, runs: u64) -> [f64; 3] {
+        let of_run = |run| f64::from(luminance(referee.irradiance(place, 1024, run)));
+        let light: Vec<f64> = (0..runs).map(of_run).collect();
         let n = runs as f64;
         let mean = light.iter().sum::<f64>() / n;
         let variance = light.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -457,28 +457,21 @@ mod tests {
     /// Light paths change what is found by chance, and nothing else, through a sheet and off it, too.
     #[test]
     fn light_paths_find_the_same_light() {
-        let opal = Material {
-            base_color: [0.4, 0.4, 0.4, 1.0],
-            transmission: Some(Transmission {
-                transmittance: [0.5; 3],
-                texture: None,
-                replaced: 0.0,
-                share_texture: None,
-            }),
-            ..Material::default()
-        };
         let (table, close) = (DVec3::new(1.0, 1.0, 0.8), DVec3::new(2.0, 1.46, 2.46));
         // With how much more variance at least light is found by chance.
         let cases = [
             (0.2, None, table, 20.0),
             (0.05, None, table, 200.0),
-            (0.2, Some(opal), table, 4.0),
+            (0.2, Some(opal()), table, 4.0),
             (0.04, None, close, 1.0),
         ];
         for (gap, sheet, point, times) in cases {
             let scene = room(gap, sheet);
-            let [[plain, plain_error, variance], [mean, error, less]] =
-                [seen((&scene, point), false, 256), seen((&scene, point), true, 32)];
+            let mesh = Mesh::new(&scene);
+            let tracer = Tracer::new(&scene, &mesh);
+            let place = Place { point, normal: DVec3::Z, triangle: u32::MAX };
+            let of = |from_lamps, runs| seen(&Referee { from_lamps, ..Referee::new(&tracer) }, &place, runs);
+            let [[plain, plain_error, variance], [mean, error, less]] = [of(false, 256), of(true, 32)];
             let off = (mean - plain).abs() / plain_error.hypot(error);
             assert!(off < 3.0, "{plain} ± {plain_error}, {mean} ± {error}");
             assert!(variance > times * less, "{variance}, {less}");

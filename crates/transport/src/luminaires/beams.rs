@@ -25,6 +25,10 @@ const RECTANGLES: usize = 24;
 /// Nor where they give less than this part of what other lights give to what they light.
 const NEGLIGIBLE: f64 = 0.02;
 
+/// Places of a receiver at which light of narrow beams is looked at, and others that are tried for one where there is none.
+const BEAM_ENDS: f64 = 16.0;
+const SPARE: usize = 64;
+
 impl Luminaires {
     /// With the ends of narrow beams as one more light, the last, if there are any.
     pub fn with_beams(mut self, tracer: &Tracer, elements: &Elements) -> Luminaires {
@@ -99,6 +103,35 @@ impl Luminaires {
     /// Whether a beam that is a light ends at a place, of one of the scene's lights without area.
     pub(crate) fn is_end(&self, tracer: &Tracer, light: usize, place: &Place) -> bool {
         self.beams_on(tracer, place.triangle).any(|beam| beam.light as usize == light && beam.holds(place))
+    }
+
+    /// Adds places where beams end to those of a receiver, which then stand for the rest of it; one of some to spare does where none of them is left. The
+    /// sum over what is lit begins at an offset in [0, 1).
+    pub(crate) fn add_ends(
+        &self,
+        (tracer, spare): (&Tracer, impl Iterator<Item = Place>),
+        (ends, offset): (&[(Place, f64)], f32),
+        nodes: &mut Vec<(Place, f64)>,
+    ) {
+        let is_free = |place: &Place| !self.beams_on(tracer, place.triangle).any(|beam| beam.holds(place));
+        nodes.retain(|(place, _)| is_free(place));
+        if nodes.is_empty() {
+            nodes.extend(spare.take(SPARE).find(is_free).map(|place| (place, 0.0)));
+        }
+        let lit: f64 = ends.iter().map(|(_, share)| share).sum();
+        let rest = nodes.len() as f64;
+        let share = if nodes.is_empty() { 1.0 } else { lit.min(1.0) };
+        nodes.iter_mut().for_each(|(_, weight)| *weight = (1.0 - share) / rest);
+        // Of cells by what is lit of them, as many places as are to be.
+        let (mut reached, step) = (f64::from(offset), BEAM_ENDS / lit);
+        for (place, own) in ends {
+            let before = f64::floor(reached);
+            reached += own * step;
+            let count = reached.floor() - before;
+            if count > 0.0 {
+                nodes.push((*place, count * share / BEAM_ENDS));
+            }
+        }
     }
 }
 

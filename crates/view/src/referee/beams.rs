@@ -24,9 +24,7 @@ impl BeamEnds {
         for (number, beam) in (0..).zip(tracer.beams().all()) {
             first.push(cells.len() as u32);
             for (k, cell) in (0..).zip(beam.cells()) {
-                let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-                let [a, b, c, d] = corners.map(|[x, y]| beam.point(k as usize, x, y));
-                let bounds = [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))];
+                let bounds = beam.around(k as usize);
                 let at = mesh.surface(beam.triangle as usize, mesh.barycentric(beam.triangle as usize, cell.lit));
                 let arriving = luminance(scene.lights[beam.light as usize].arrival(cell.lit).2);
                 // Black cells are sampled as well, now and then: what a picture shows elsewhere in them is not known.
@@ -61,8 +59,7 @@ impl BeamEnds {
         if !is_before || uv.min_element() < 0.0 || uv.x + uv.y > 1.0 || falling <= 0.0 || edge <= 0.0 {
             return [0.0; 3];
         }
-        let length = if distance.is_finite() { distance - tracer.offset() } else { f64::INFINITY };
-        let is_lit = length <= 0.0 || !tracer.blocked(&tracer.ray(&end, towards, length), random.next_bits());
+        let is_lit = tracer.sees_lamp(&end, (towards, distance), random.next_bits());
         if !is_lit || !tracer.mutually_visible(place, &end, random.next_bits()) {
             return [0.0; 3];
         }
@@ -107,8 +104,9 @@ fn density(from: &Place, to: &Place) -> f64 {
 mod tests {
     use super::*;
     use crate::Referee;
+    use crate::referee::tests::{opal, seen};
     use glam::DVec3;
-    use radiosity_scene::{Material, Mesh, PointLight, PointLightKind, Scene, Transmission};
+    use radiosity_scene::{Material, Mesh, PointLight, PointLightKind, Scene};
 
     /// A room of 4 × 3 × 2.5 m with a hole of 15 cm in its ceiling, the sun above, and maybe a sheet on which the spot falls.
     fn room(sheet: Option<Material>) -> Scene {
@@ -144,21 +142,11 @@ mod tests {
     /// What is sampled where beams end changes what is found by chance, and nothing else, on a sheet and behind it, too.
     #[test]
     fn ends_of_beams_are_the_light_that_paths_find() {
-        let opal = Material {
-            base_color: [0.4, 0.4, 0.4, 1.0],
-            transmission: Some(Transmission {
-                transmittance: [0.5; 3],
-                texture: None,
-                replaced: 0.0,
-                share_texture: None,
-            }),
-            ..Material::default()
-        };
         // With how much more variance at least light is found by chance; what passes a sheet is found by chance alone.
         let cases = [
             (None, DVec3::new(0.5, 1.0, 2.0), -DVec3::Z, 20.0),
-            (Some(opal.clone()), DVec3::new(0.5, 1.0, 2.0), -DVec3::Z, 0.0),
-            (Some(opal), DVec3::new(1.5, 1.0, 0.01), DVec3::Z, 0.0),
+            (Some(opal()), DVec3::new(0.5, 1.0, 2.0), -DVec3::Z, 0.0),
+            (Some(opal()), DVec3::new(1.5, 1.0, 0.01), DVec3::Z, 0.0),
         ];
         for (sheet, point, normal, times) in cases {
             let scene = room(sheet);
@@ -168,15 +156,8 @@ mod tests {
             let plain = Referee { beams: BeamEnds::default(), ..referee.clone() };
             assert!(!tracer.beams().all().is_empty());
             let place = Place { point, normal, triangle: u32::MAX };
-            let seen = |referee: &Referee, runs: u64| {
-                let of_run = |run| f64::from(luminance(referee.irradiance(&place, 1024, run)));
-                let light: Vec<f64> = (0..runs).map(of_run).collect();
-                let n = runs as f64;
-                let mean = light.iter().sum::<f64>() / n;
-                let variance = light.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1.0);
-                [mean, (variance / n).sqrt(), variance]
-            };
-            let ([by_chance, plain_error, variance], [mean, error, less]) = (seen(&plain, 512), seen(&referee, 64));
+            let ([by_chance, plain_error, variance], [mean, error, less]) =
+                (seen(&plain, &place, 512), seen(&referee, &place, 64));
             let off = (mean - by_chance).abs() / plain_error.hypot(error);
             assert!(off < 3.0, "{by_chance} ± {plain_error}, {mean} ± {error}");
             assert!(variance > times * less, "{variance}, {less}");
