@@ -8,12 +8,13 @@
 //! What is cut out of a surface by its opacity has no edges, and is not looked for; nor is anything where panes let a part of the light pass by chance, or
 //! where there are millions of triangles.
 
+use crate::edges::Edges;
+use crate::grid::{Grid, Parts};
 use crate::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use crate::{Found, Place, Tracer};
 use glam::DVec3;
-use radiosity_scene::{Mesh, PointLight, Side, luminance};
+use radiosity_scene::{PointLight, Side, luminance};
 use rayon::prelude::*;
-use std::collections::{HashMap, VecDeque};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
@@ -45,13 +46,9 @@ const SIGHTS: u32 = 16;
 const SEEDS: usize = 1024;
 const FAILURES: usize = 16;
 
-/// Cells of one beam at most, rays that look whether any of a cell is lit, and those that tell how much.
-const CELLS: usize = 512;
+/// Rays that look whether any of a cell is lit, and those that tell how much.
 const GLANCES: u32 = 4;
 const LOOKS: u32 = 16;
-
-/// A beam's end is as many rectangles as it takes for none to have more than this part of it that is spread over what is not lit.
-const UNEVEN: f64 = 0.02;
 
 /// The streams of sample points that these use.
 const ON_DISC: u32 = 0x0500;
@@ -72,109 +69,20 @@ pub struct Beam {
     pub side: Side,
     /// Unit normal of that side.
     pub normal: DVec3,
-    origin: DVec3,
-    axes: [DVec3; 2],
-    /// Of a cell, along the axes.
-    widths: [f64; 2],
-    /// Corners of a box around it.
-    bounds: [DVec3; 2],
-    /// In the order of `at`.
-    cells: Vec<Cell>,
-}
-
-/// A part of a beam's end.
-#[derive(Clone, Debug)]
-pub struct Rectangle {
-    /// Counter-clockwise seen from the side that is lit.
-    pub corners: [DVec3; 4],
-    /// The cells in it, some of each of which are lit.
-    pub cells: Vec<Cell>,
-    /// How many it would take to fill it.
-    pub count: f64,
-}
-
-/// A rectangle of the grid of a [`Beam`].
-#[derive(Clone, Copy, Debug)]
-pub struct Cell {
-    at: [i32; 2],
-    /// Part of it that is lit.
-    pub share: f32,
-    /// A place that is.
-    pub lit: DVec3,
+    /// Where it ends; cells may reach beyond the triangle.
+    pub end: Grid,
 }
 
 impl Beam {
-    /// One of cells that are still to be found, along the edge that the seed comes from.
-    fn new(seed: &Seed, width: f64) -> Beam {
-        let Seed { light, side, place, along, .. } = *seed;
-        let axes = [along, place.normal.cross(along)];
-        let Place { point, normal, triangle } = place;
-        Beam {
-            light,
-            triangle,
-            side,
-            normal,
-            origin: point,
-            axes,
-            widths: [width; 2],
-            bounds: [point; 2],
-            cells: Vec::new(),
-        }
-    }
-
-    /// Its cells, some of each of which are lit.
-    pub fn cells(&self) -> &[Cell] {
-        &self.cells
-    }
-
-    /// Area of a cell, m².
-    pub fn area(&self) -> f64 {
-        self.widths[0] * self.widths[1]
-    }
-
-    /// Corners of a box around its end.
-    pub fn bounds(&self) -> [DVec3; 2] {
-        self.bounds
-    }
-
-    /// Its end as few rectangles, `most` at most. Those that are lit least evenly are cut first.
-    pub fn rectangles(&self, most: usize) -> Vec<Rectangle> {
-        let mut parts = vec![Part::new(self, self.cells.clone())];
-        let all = self.lit();
-        while parts.len() < most
-            && let Some(worst) = (0..parts.len()).max_by(|a, b| parts[*a].uneven.total_cmp(&parts[*b].uneven))
-            && parts[worst].uneven > UNEVEN * all
-        {
-            let Part { cells, sides, .. } = parts.swap_remove(worst);
-            let length = |axis: usize| self.widths[axis] * f64::from(sides[axis][1] - sides[axis][0]);
-            let is_single = |axis: usize| sides[axis][1] - sides[axis][0] < 2;
-            let axis = usize::from(is_single(0) || length(1) > length(0) && !is_single(1));
-            let middle = sides[axis][0].midpoint(sides[axis][1]);
-            let (low, high): (Vec<Cell>, Vec<Cell>) = cells.iter().partition(|cell| cell.at[axis] < middle);
-            parts.extend([low, high].map(|cells| Part::new(self, cells)));
-        }
-        let rectangle = |Part { sides: [[left, right], [low, high]], count, cells, .. }: Part| {
-            let corners = [[left, low], [right, low], [right, high], [left, high]];
-            Rectangle { corners: corners.map(|at| self.within(at, 0.0, 0.0)), cells, count }
-        };
-        parts.into_iter().map(rectangle).collect()
-    }
-
-    /// Whether a point of the triangle lies in a cell or beside one.
-    fn is_about(&self, point: DVec3) -> bool {
-        let [i, j] = self.at(point);
-        let around = (i - 1..=i + 1).flat_map(|i| (j - 1..=j + 1).map(move |j| [i, j]));
-        around.into_iter().any(|at| self.cells.binary_search_by_key(&at, |cell| cell.at).is_ok())
-    }
-
     /// What is lit, m².
     pub fn lit(&self) -> f64 {
-        self.area() * self.cells.iter().map(|cell| f64::from(cell.share)).sum::<f64>()
+        self.end.area_within()
     }
 
     /// A place where it ends.
     pub fn middle(&self) -> Place {
-        Place { point: self.cells[self.cells.len() / 2].lit, normal: self.normal, triangle: self.triangle }
+        let cells = self.end.cells();
+        Place { point: cells[cells.len() / 2].point, normal: self.normal, triangle: self.triangle }
     }
 
     /// The surfaces that some rays by cosine meet from there: how far away, and where.
@@ -189,123 +97,50 @@ impl Beam {
 
     /// Whether it ends at a place of its triangle.
     pub fn holds(&self, place: &Place) -> bool {
-        self.normal.dot(place.normal) > 0.0 && self.cell(place.point).is_some()
+        self.normal.dot(place.normal) > 0.0 && self.end.cell(place.point).is_some()
     }
+}
 
-    /// The number of the cell that a point of the triangle lies in.
-    pub fn cell(&self, point: DVec3) -> Option<usize> {
-        let at = self.at(point);
-        self.cells.binary_search_by_key(&at, |cell| cell.at).ok()
-    }
+/// The surface on which a beam may end.
+struct Target<'t> {
+    tracer: &'t Tracer<'t>,
+    light: u32,
+    triangle: u32,
+    normal: DVec3,
+    /// Beams that end there already.
+    earlier: &'t [Beam],
+}
 
-    /// Corners of a box around a cell.
-    pub fn around(&self, cell: usize) -> [DVec3; 2] {
-        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let [a, b, c, d] = corners.map(|[x, y]| self.point(cell, x, y));
-        [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
-    }
-
-    /// The point of a cell that (x, y) in the unit square tells; it may lie off the triangle.
-    pub fn point(&self, cell: usize, x: f64, y: f64) -> DVec3 {
-        self.within(self.cells[cell].at, x, y)
-    }
-
-    fn at(&self, point: DVec3) -> [i32; 2] {
-        [0, 1].map(|k| ((point - self.origin).dot(self.axes[k]) / self.widths[k]).floor() as i32)
-    }
-
-    fn within(&self, [i, j]: [i32; 2], x: f64, y: f64) -> DVec3 {
-        let [along, across] = [0, 1].map(|k| self.widths[k] * self.axes[k]);
-        self.origin + (f64::from(i) + x) * along + (f64::from(j) + y) * across
-    }
-
+impl Target<'_> {
     /// The places of a cell that are lit and that no earlier beam has, of some that are spread over it.
-    fn lit_of<'s>(
-        &'s self,
-        (tracer, earlier): (&'s Tracer, &'s [Beam]),
-        at: [i32; 2],
-        looks: u32,
-    ) -> impl Iterator<Item = DVec3> + 's {
+    fn lit_of<'s>(&'s self, grid: &'s Grid, at: [i32; 2], looks: u32) -> impl Iterator<Item = DVec3> + 's {
+        let Target { tracer, light, triangle, normal, earlier } = *self;
         let [i, j] = at.map(|x| x as u32);
-        let seed = hash(i ^ hash(j ^ hash(self.triangle)));
+        let seed = hash(i ^ hash(j ^ hash(triangle)));
         let sequence = Sequence::new(seed, IN_CELL);
-        let light = &tracer.scene.lights[self.light as usize];
+        let light = &tracer.scene.lights[light as usize];
         let places = (0..looks).map(move |look| {
             let [x, y] = sequence.pair(look).map(f64::from);
-            Place { point: self.within(at, x, y), normal: self.normal, triangle: self.triangle }
+            Place { point: grid.within(at, x, y), normal, triangle }
         });
-        let is_on = |place: &Place| {
-            let uv = tracer.mesh.barycentric(self.triangle as usize, place.point);
+        let is_on = move |place: &Place| {
+            let uv = tracer.mesh.barycentric(triangle as usize, place.point);
             uv.x >= 0.0 && uv.y >= 0.0 && uv.x + uv.y <= 1.0
         };
-        let is_free = |place: &Place| !earlier.iter().any(|beam| beam.holds(place));
+        let is_free = move |place: &Place| !earlier.iter().any(|beam| beam.holds(place));
         places
             .filter(move |place| is_on(place) && is_free(place) && reaches(tracer, light, place, seed))
             .map(|place| place.point)
     }
+}
 
-    /// Grows it from a place that is lit. `None` where that is too much to be the end of a beam.
-    fn grown(mut self, of: (&Tracer, &[Beam]), from: DVec3, coarsest: f64) -> Option<Beam> {
-        while self.widths[0].min(self.widths[1]) <= coarsest {
-            let start = self.at(from);
-            let mut lit = HashMap::from([(start, from)]);
-            let mut next = VecDeque::from([start]);
-            while let Some([i, j]) = next.pop_front()
-                && lit.len() <= CELLS
-            {
-                for at in [[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]] {
-                    if !lit.contains_key(&at)
-                        && let Some(place) = self.lit_of(of, at, GLANCES).next()
-                    {
-                        lit.insert(at, place);
-                        next.push_back(at);
-                    }
-                }
-            }
-            if lit.len() <= CELLS {
-                let cell = |(at, lit)| {
-                    let share = self.lit_of(of, at, LOOKS).count().max(1) as f32 / LOOKS as f32;
-                    Cell { at, share, lit }
-                };
-                self.cells = lit.into_iter().map(cell).collect();
-                self.cells.sort_unstable_by_key(|cell| cell.at);
-                let boxes = (0..self.cells.len()).map(|cell| self.around(cell));
-                self.bounds = boxes.fold([from; 2], |[low, high], [a, b]| [low.min(a), high.max(b)]);
-                return Some(self);
-            }
-            // What is long has long cells: a slit would be lost between places that are spread over wide ones.
-            let length = |axis: usize| {
-                let (low, high) = lit.keys().fold((0, 0), |(low, high), at| (at[axis].min(low), at[axis].max(high)));
-                high - low
-            };
-            let axis = usize::from(length(1) > length(0));
-            self.widths[axis] *= 2.0;
-        }
-        None
+impl Parts for Target<'_> {
+    fn glance(&self, grid: &Grid, at: [i32; 2], _: DVec3) -> Option<DVec3> {
+        self.lit_of(grid, at, GLANCES).next()
     }
-}
 
-/// Some cells of a beam, and the rectangle around them.
-struct Part {
-    cells: Vec<Cell>,
-    /// The first cell along each axis, and the one after the last.
-    sides: [[i32; 2]; 2],
-    /// How many cells the rectangle has.
-    count: f64,
-    /// What is lit of it, m², by how unlike it is to all of it; nothing of what cannot be cut.
-    uneven: f64,
-}
-
-impl Part {
-    fn new(beam: &Beam, cells: Vec<Cell>) -> Part {
-        let sides = [0, 1].map(|axis| {
-            let at = cells.iter().map(|cell| cell.at[axis]);
-            [at.clone().min().unwrap_or(0), at.max().unwrap_or(0) + 1]
-        });
-        let count = sides.iter().map(|[low, high]| f64::from(high - low)).product::<f64>();
-        let lit: f64 = cells.iter().map(|cell| f64::from(cell.share)).sum();
-        let uneven = if count > 1.0 { beam.area() * lit * (1.0 - lit / count) } else { 0.0 };
-        Part { cells, sides, count, uneven }
+    fn share(&self, grid: &Grid, at: [i32; 2]) -> f32 {
+        self.lit_of(grid, at, LOOKS).count().max(1) as f32 / LOOKS as f32
     }
 }
 
@@ -358,12 +193,15 @@ impl Beams {
             let mut failures = 0;
             for seed in *group {
                 let Seed { side, place, radius, .. } = seed;
-                if beams.iter().any(|beam| beam.side == *side && beam.is_about(place.point)) {
+                if beams.iter().any(|beam| beam.side == *side && beam.end.is_about(place.point)) {
                     continue;
                 }
-                let beam = Beam::new(seed, PAST * tracer.offset());
-                match beam.grown((tracer, &beams), place.point, radius / COARSEST) {
-                    Some(beam) => beams.push(beam),
+                let Place { point, normal, triangle } = *place;
+                let axes = [seed.along, normal.cross(seed.along)];
+                let target = Target { tracer, light: seed.light, triangle, normal, earlier: &beams };
+                let grid = Grid::new(point, axes, PAST * tracer.offset());
+                match grid.grown(&target, radius / COARSEST) {
+                    Some(end) => beams.push(Beam { light: seed.light, triangle, side: *side, normal, end }),
                     None => failures += 1,
                 }
                 if failures > FAILURES {
@@ -378,7 +216,7 @@ impl Beams {
 
     /// Memory that they take, bytes.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.list) + self.list.iter().map(|beam| size_of_val(&*beam.cells)).sum::<usize>()
+        size_of_val(&*self.list) + self.list.iter().map(|beam| beam.end.bytes()).sum::<usize>()
     }
 
     /// All of them.
@@ -422,26 +260,10 @@ fn reaches(tracer: &Tracer, light: &PointLight, place: &Place, seed: u32) -> boo
     falls && tracer.sees_lamp(place, (towards, distance), seed)
 }
 
-/// The edges of a mesh, and the corners of its triangles that lie opposite each.
-struct Edges<'a> {
-    mesh: &'a Mesh,
-    /// Ends of the edge, and the corner opposite it, of all triangles; those of one edge follow each other.
-    sides: Vec<[u32; 3]>,
-}
-
 impl Edges<'_> {
-    fn of(mesh: &Mesh) -> Edges<'_> {
-        let of_triangle =
-            |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, c]| [a.min(b), a.max(b), c]);
-        let mut sides: Vec<[u32; 3]> = mesh.triangles.par_iter().flat_map_iter(of_triangle).collect();
-        sides.par_sort_unstable();
-        Edges { mesh, sides }
-    }
-
     /// Where narrow beams end that pass an edge which has nothing of its surfaces on one side, as the light sees it.
     fn seeds(&self, of: (&Tracer, f64), (number, light): (u32, &PointLight), probes: f64) -> Vec<Seed> {
-        let outlines: Vec<Outline> =
-            self.sides.par_chunk_by(|a, b| a[..2] == b[..2]).filter_map(|own| self.outline(own, light)).collect();
+        let outlines: Vec<Outline> = self.all().filter_map(|own| self.outline(own, light)).collect();
         let whole: f64 = outlines.iter().map(|outline| outline.along.length()).sum();
         // As many to each edge as its length and its being one tell; where there are too many edges, one now and then.
         let wanted = |outline: &Outline| {
@@ -538,7 +360,8 @@ fn is_narrow(tracer: &Tracer, light: &PointLight, place: &Place, radius: f64, sa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use radiosity_scene::{Material, PointLightKind, Scene};
+    use crate::Rectangle;
+    use radiosity_scene::{Material, Mesh, PointLightKind, Scene};
 
     /// A floor of 20 × 20 m, 10 m below a roof with an opening, walls, and the sun above.
     fn hall([x, end]: [f64; 2], [y, top]: [f64; 2]) -> Scene {
@@ -627,19 +450,20 @@ mod tests {
         let tracer = Tracer::new(&scene, &mesh);
         for beam in tracer.beams().all() {
             for turned in [0.0, 0.7] {
-                let mut beam = beam.clone();
                 // As if the grid lay otherwise.
                 let (sin, cos) = f64::sin_cos(turned);
-                let [x, y] = beam.axes;
-                beam.axes = [cos * x + sin * y, cos * y - sin * x];
-                beam.widths = [0.02; 2];
-                let beam = beam.clone().grown((&tracer, &[]), beam.middle().point, 1.0).unwrap();
-                let rectangles = beam.rectangles(8);
+                let x = DVec3::X.reject_from_normalized(beam.normal).normalize();
+                let y = beam.normal.cross(x);
+                let axes = [cos * x + sin * y, cos * y - sin * x];
+                let Beam { light, triangle, normal, .. } = *beam;
+                let target = Target { tracer: &tracer, light, triangle, normal, earlier: &[] };
+                let end = Grid::new(beam.middle().point, axes, 0.02).grown(&target, 1.0).unwrap();
+                let rectangles = end.rectangles(8);
                 assert!(rectangles.len() <= 8);
                 let area = |[a, b, _, d]: &[DVec3; 4]| (*b - *a).cross(*d - *a).length();
                 let share = |r: &Rectangle| r.cells.iter().map(|c| f64::from(c.share)).sum::<f64>() / r.count;
                 let lit: f64 = rectangles.iter().map(|r| share(r) * area(&r.corners)).sum();
-                assert!((lit - beam.lit()).abs() < 1e-9 * lit, "{lit}, {}", beam.lit());
+                assert!((lit - end.area_within()).abs() < 1e-9 * lit, "{lit}, {}", end.area_within());
             }
         }
     }

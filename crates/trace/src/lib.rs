@@ -10,11 +10,14 @@ pub mod beams;
 pub mod brute;
 mod build;
 mod collapse;
+mod edges;
 pub mod emitters;
+mod grid;
 mod importance;
 mod intersect;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+mod openings;
 mod portable;
 pub mod ray;
 mod shaft;
@@ -23,10 +26,12 @@ pub mod tree;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 mod walk;
 
-pub use beams::{Beam, Beams, Rectangle};
+pub use beams::{Beam, Beams};
 pub use brute::{blocked_brute, closest_brute, closest_where_brute};
 pub use emitters::{Emitter, EmitterTree};
+pub use grid::{Cell, Grid, Rectangle};
 pub use importance::narrowed;
+pub use openings::{Opening, Openings};
 pub use ray::{Hit, Ray};
 pub use tree::{Flaw, Tree};
 

@@ -8,7 +8,7 @@
 
 use crate::sampling::{hash, unit};
 use crate::shaft::Shaft;
-use crate::{Beams, Hit, Ray, Tree};
+use crate::{Beams, Hit, Openings, Ray, Tree};
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{AlphaMode, EdgeSide, Mesh, Scene, Side};
 use rayon::prelude::*;
@@ -112,6 +112,7 @@ pub struct Tracer<'a> {
     /// From where light is looked at.
     eyes: Vec<DVec3>,
     beams: OnceLock<Beams>,
+    openings: OnceLock<Openings>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -227,6 +228,7 @@ impl<'a> Tracer<'a> {
             scales: Vec::new(),
             eyes: Vec::new(),
             beams: OnceLock::new(),
+            openings: OnceLock::new(),
         }
     }
 
@@ -264,6 +266,7 @@ impl<'a> Tracer<'a> {
             + size_of_val(&*self.scales)
             + size_of_val(&*self.eyes)
             + self.beams.get().map_or(0, Beams::bytes)
+            + self.openings.get().map_or(0, Openings::bytes)
     }
 
     /// Whether anything lets a part of the light pass, by chance for each ray.
@@ -279,6 +282,11 @@ impl<'a> Tracer<'a> {
     /// itself.
     pub fn beams(&self) -> &Beams {
         self.beams.get_or_init(|| Beams::find(self))
+    }
+
+    /// Small openings through which the sky shines in, looked for when they are first asked for, as beams are.
+    pub fn openings(&self) -> &Openings {
+        self.openings.get_or_init(|| Openings::find(self))
     }
 
     /// The tree of boxes (its coordinates are relative to the scene's centre).

@@ -14,7 +14,7 @@ use crate::{Columns, Luminaires, Progress, Receivers, Site, Stopped};
 use glam::{DVec2, DVec3, Vec3};
 use radiosity_scene::{Bands, Curve, Side, Surface, luminance};
 use radiosity_trace::sampling::{EIGHT, Sequence, cosine_directions, frame, hash, unit};
-use radiosity_trace::{Fan, Found, Place, Ray, Tracer};
+use radiosity_trace::{Fan, Found, Openings, Place, Ray, Tracer};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -47,6 +47,12 @@ const PATHS: u32 = 0x0210;
 
 /// That of rays to what glows.
 const GLOW: u32 = 0x0220;
+
+/// Rays through small openings for each that goes everywhere.
+pub(crate) const OUTWARD: f64 = 0.125;
+
+/// That of rays through small openings.
+const OPENINGS: u32 = 0x0230;
 
 /// A solution, as a gather reads it.
 pub struct Gather<'a> {
@@ -83,6 +89,7 @@ impl<'a> Gather<'a> {
             looked_up: self.looked_up(),
             glance: Glance::new(self.luminaires),
             glow: Glow::new(self),
+            openings: self.tracer.openings(),
         };
         let done = AtomicUsize::new(0);
         let order = in_groups(receivers);
@@ -265,6 +272,7 @@ struct End {
     spot: Option<Spot>,
     id: u32,
     distance: f32,
+    is_sky: bool,
 }
 
 /// Whether a path goes on from what is near.
@@ -286,6 +294,8 @@ struct Caster<'g, 'a> {
     glance: Option<Glance<'a>>,
     /// What is sought, if anything is worth it.
     glow: Option<Glow>,
+    /// Where the sky is sought.
+    openings: &'g Openings,
 }
 
 impl<'a> Caster<'_, 'a> {
@@ -300,31 +310,53 @@ impl<'a> Caster<'_, 'a> {
     /// What counts of the light that a ray has from its end.
     #[inline]
     fn share(&self, above: &Hemisphere, ray: &Ray, end: &End) -> f64 {
-        let found = |glow: &Glow| glow.found(end.id, &above.place, ray.direction.as_dvec3(), end.distance.into());
+        let direction = ray.direction.as_dvec3();
+        if end.is_sky {
+            return self.openings.found(&above.place, direction, OUTWARD);
+        }
+        let found = |glow: &Glow| glow.found(end.id, &above.place, direction, end.distance.into());
         self.glow.as_ref().map_or(1.0, found)
     }
 
     /// The mean over the hemisphere of a site of what is sought, by either half of its rays.
     fn sought(&self, (site, seed): (&Site, u32), half_rays: u32, parts: &mut Parts<'a>) -> [Bands; 2] {
-        let Some(glow) = &self.glow else { return Default::default() };
-        let (sequence, salt) = (Sequence::new(seed, GLOW), hash(seed ^ GLOW));
-        let rays = (SOUGHT * f64::from(half_rays)).ceil() as u32;
-        [0, rays].map(|first| {
-            let mut sum = [0.0; 3];
-            for index in first..first + rays {
-                let [u, v, x, y] = sequence.point(index);
-                let above = Hemisphere::new(self.gather.tracer, &site.place(x, y));
-                let drawn = [u, v].map(f64::from);
-                let Some((id, direction, counts)) = glow.sought(self.gather, &above.place, drawn) else { continue };
-                let seed = hash(salt ^ index);
-                let end = self.end(&above.fan.ray(direction.as_vec3(), f32::INFINITY), seed);
-                if end.id == id {
-                    let light = self.seen(&end, seed, parts);
-                    (0..3).for_each(|band| sum[band] += counts * light[band]);
-                }
-            }
-            sum.map(|light: f64| (light / f64::from(rays)) as f32)
-        })
+        let mut mean =
+            |stream: u32, more: f64, seek: &dyn Fn(&Place, [f64; 2]) -> Option<(Option<u32>, DVec3, f64)>| {
+                let rays = (more * f64::from(half_rays)).ceil() as u32;
+                let (sequence, salt) = (Sequence::new(seed, stream), hash(seed ^ stream));
+                [0, rays].map(|first| {
+                    let mut sum = [0.0; 3];
+                    for index in first..first + rays {
+                        let [u, v, x, y] = sequence.point(index);
+                        let above = Hemisphere::new(self.gather.tracer, &site.place(x, y));
+                        let Some((id, direction, counts)) = seek(&above.place, [u, v].map(f64::from)) else { continue };
+                        let seed = hash(salt ^ index);
+                        let end = self.end(&above.fan.ray(direction.as_vec3(), f32::INFINITY), seed);
+                        if id.map_or(end.is_sky, |id| end.id == id) {
+                            let light = self.seen(&end, seed, parts);
+                            (0..3).for_each(|band| sum[band] += counts * light[band]);
+                        }
+                    }
+                    sum.map(|light: f64| light / f64::from(rays))
+                })
+            };
+        let mut sought = [[0.0; 3]; 2];
+        let mut add = |more: [[f64; 3]; 2]| {
+            (0..2).for_each(|half| (0..3).for_each(|band| sought[half][band] += more[half][band]));
+        };
+        if let Some(glow) = &self.glow {
+            add(mean(GLOW, SOUGHT, &|place, drawn| {
+                let (id, direction, counts) = glow.sought(self.gather, place, drawn)?;
+                Some((Some(id), direction, counts))
+            }));
+        }
+        if !self.openings.all().is_empty() {
+            add(mean(OPENINGS, OUTWARD, &|place, drawn| {
+                let (direction, counts) = self.openings.counted(place, drawn, OUTWARD)?;
+                Some((None, direction, counts))
+            }));
+        }
+        sought.map(|half| half.map(|light| light as f32))
     }
 
     /// The light of what a ray met, and of what that sees where it is near.
@@ -365,12 +397,13 @@ impl<'a> Caster<'_, 'a> {
         let found = tracer.first(ray, seed);
         let id = ids.id(found, ray.direction.as_dvec3());
         let [r, g, b, near] = self.looked_up[id as usize];
+        let is_sky = found == Found::Escaped;
         let (mut spot, mut distance) = (None, f32::INFINITY);
         if let Found::Surface { triangle, uv, side, distance: t } = found {
             distance = t;
             spot = (t < near).then_some(Spot { triangle: triangle as usize, uv, side, id });
         }
-        End { light: [r, g, b], spot, id, distance }
+        End { light: [r, g, b], spot, id, distance, is_sky }
     }
 
     /// The same along a ray that met `light` and goes on as a path from the very spot, first to a direction and by a light that are `drawn`.
@@ -419,9 +452,24 @@ impl<'a> Caster<'_, 'a> {
                 None => gather.one_light((&place, is_whole), element as usize, (pick, seed), parts),
             };
             (0..3).for_each(|band| sum[band] += throughput[band] * direct[band]);
-            let End { light, spot, .. } = self.end(&Hemisphere::new(gather.tracer, &place).towards([u, v]), seed);
-            end = (light, spot.filter(|_| is_followed(seed)));
+            let above = Hemisphere::new(gather.tracer, &place);
+            let ray = above.towards([u, v]);
+            let End { light, spot, is_sky, .. } = self.end(&ray, seed);
             drawn = draw(seed);
+            let mut share = 1.0;
+            if !self.openings.all().is_empty() {
+                let [u, v, _] = draw(hash(seed ^ OPENINGS)).map(f64::from);
+                if is_sky {
+                    share = self.openings.found(&place, ray.direction.as_dvec3(), 1.0);
+                }
+                if let Some((direction, counts)) = self.openings.counted(&place, [u, v], 1.0) {
+                    let out = self.end(&above.fan.ray(direction.as_vec3(), f32::INFINITY), seed);
+                    if out.is_sky {
+                        (0..3).for_each(|band| sum[band] += throughput[band] * counts * f64::from(out.light[band]));
+                    }
+                }
+            }
+            end = (light.map(|l| share as f32 * l), spot.filter(|_| is_followed(seed)));
         }
         sum
     }

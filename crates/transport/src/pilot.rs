@@ -45,6 +45,9 @@ const OPEN: f64 = 0.1;
 /// What the rays of a group may have missed is little where it is less than this part of what those nearby found.
 const TRUSTED: f64 = 0.01;
 
+/// Light of rays that is less than this part of what is known beside it needs no others: weighed against what was sought, none of them is bright.
+const LITTLE: f64 = 0.25;
+
 /// Where rays of a group found nothing at all, so many are believed: a few millionths of the brightest may be there.
 const SURE: u32 = 1 << 17;
 
@@ -79,6 +82,8 @@ struct Receiver {
     facing: Option<Facing>,
     rays: u32,
     halves: [[f64; 3]; 2],
+    /// What is known beside that.
+    known: [[f64; 3]; 2],
     sums: Sums,
     /// Its part of what was found.
     found: Range<usize>,
@@ -90,6 +95,8 @@ struct Sums {
     rays: u32,
     light: f64,
     square: f64,
+    /// What is known beside that of rays.
+    known: f64,
 }
 
 impl Sums {
@@ -98,6 +105,7 @@ impl Sums {
             rays: sum.rays + own.rays,
             light: sum.light + own.sums.light,
             square: sum.square + own.sums.square,
+            known: sum.known + own.sums.known,
         })
     }
 
@@ -163,6 +171,13 @@ impl Pilot {
         own.found.end = self.found.len();
     }
 
+    /// What light receiver k, the last one that was placed, has in either half of what its rays are not told of: the mean over its hemisphere.
+    pub fn know(&mut self, k: usize, halves: [[f64; 3]; 2]) {
+        let own = &mut self.receivers[k];
+        own.known = halves;
+        own.sums.known = 0.5 * f64::from(own.rays) * halves.map(luminance_of).iter().sum::<f64>();
+    }
+
     /// Whether the first rays of all receivers are believed.
     pub fn is_clear(&mut self) -> bool {
         (0..self.receivers.len()).all(|k| self.receivers[k].facing.is_none() || self.is_believed(k))
@@ -175,7 +190,7 @@ impl Pilot {
             self.make_group(k);
         }
         let (near, rays) = (Sums::of(&self.receivers[self.near(k)]), f64::from(self.of_group.rays));
-        if near.stays_even(self.peak) {
+        if near.stays_even(self.peak) || near.light < LITTLE * near.known {
             return true;
         }
         if self.of_group.light <= 0.0 {
@@ -204,9 +219,11 @@ impl Pilot {
         if own.facing.is_none() {
             return Default::default();
         }
+        let known = own.known;
+        let with = |half: usize, mean: [f64; 3]| std::array::from_fn(|band| (mean[band] + known[half][band]) as f32);
         let first = halves.map(|sum| sum.map(|s| s / f64::from(half_rays)));
         if self.is_believed(k) {
-            return first.map(|half| half.map(|e| e as f32));
+            return [0, 1].map(|half| with(half, first[half]));
         }
         let is_even = self.is_even(k);
         self.make_density(k);
@@ -221,7 +238,8 @@ impl Pilot {
             // The first rays of a light that is even tell as much as these.
             let again = sum.map(|s| s / f64::from(half_rays));
             let part = if is_even { 0.5 } else { 0.0 };
-            std::array::from_fn(|band| (part * first[half as usize][band] + (1.0 - part) * again[band]) as f32)
+            let half = half as usize;
+            with(half, std::array::from_fn(|band| part * first[half][band] + (1.0 - part) * again[band]))
         })
     }
 

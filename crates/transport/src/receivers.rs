@@ -102,7 +102,7 @@ impl Site {
         let corners = [DVec3::ZERO, self.edges[0], self.edges[1]].map(|edge| self.origin + edge);
         let bounds = corners[1..].iter().fold([corners[0]; 2], |[low, high], p| [low.min(*p), high.max(*p)]);
         let is_about = |beam: &&Beam| {
-            let [low, high] = beam.bounds();
+            let [low, high] = beam.end.bounds();
             low.cmple(bounds[1]).all() && high.cmpge(bounds[0]).all()
         };
         let beams = luminaires.beams_on(tracer, self.triangle).filter(is_about);
@@ -110,10 +110,10 @@ impl Site {
         for (k, beam) in beams.clone().enumerate() {
             let place = |point| Place { point, normal: self.normal_at(point), triangle: self.triangle };
             let is_own = |place: &Place| beam.holds(place) && !beams.clone().take(k).any(|other| other.holds(place));
-            for cell in beam.cells().iter().filter(|cell| self.contains(cell.lit)) {
-                let place = place(cell.lit);
+            for cell in beam.end.cells().iter().filter(|cell| self.contains(cell.point)) {
+                let place = place(cell.point);
                 if is_own(&place) {
-                    ends.push((place, f64::from(cell.share) * beam.area() / exposed));
+                    ends.push((place, f64::from(cell.share) * beam.end.area() / exposed));
                 }
             }
         }

@@ -13,6 +13,7 @@
 //! that the numbers are the same to the bit.
 
 use crate::block::{Block, Buffer, FileError, Lent, portion};
+use crate::gather::OUTWARD;
 use crate::pilot::{AGAIN, Pilot};
 use crate::receivers::Site;
 use crate::{Progress, Receivers, Stopped};
@@ -20,7 +21,7 @@ use glam::DVec3;
 use radiosity_scene::{Bands, Elements, SkyPatches, luminance};
 use radiosity_solve::{AreaSpace, SolveError, SparseTransport, Transport};
 use radiosity_trace::sampling::{Sequence, cosine_direction, frame, hash, unit};
-use radiosity_trace::{Found, Place, Tracer};
+use radiosity_trace::{Found, Openings, Place, Tracer};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::path::PathBuf;
@@ -68,29 +69,39 @@ impl IdSpace<'_> {
 /// known to the exposure mask, so each attempt succeeds with probability 1/2 or more.
 const ATTEMPTS: u32 = 8;
 
+/// Where a ray goes.
+#[derive(Clone, Copy)]
+enum Way {
+    /// Anywhere, by its cosine.
+    Everywhere,
+    /// Through a small opening to the sky.
+    Out,
+}
+
 /// Who casts the rays of rows.
 struct Caster<'a, R> {
     tracer: &'a Tracer<'a>,
     ids: &'a IdSpace<'a>,
     /// Radiosity of the sky patches; none where the sky is black.
     sky: &'a [Bands],
+    openings: &'a Openings,
     receivers: &'a R,
     /// Whether rays begin where receivers are seen from afar.
     from_afar: bool,
 }
 
 impl<R: Receivers> Caster<'_, R> {
-    /// The id of what a ray meets that point (u, v, x, y) of a sequence sends from a receiver; where `near` is given, from a place
-    /// that another ray leaves without meeting anything nearer.
+    /// The id of what a ray meets that point (u, v, x, y) of a sequence sends from a receiver, and what counts of the sky's light there; where `near`
+    /// is given, from a place that another ray leaves without meeting anything nearer.
     fn cast(
         &self,
         (site, near): (&Site, Option<f64>),
-        frame: &[DVec3; 3],
+        (way, frame): (Way, &[DVec3; 3]),
         [u, v, mut x, mut y]: [f32; 4],
         salt: u32,
-    ) -> u32 {
-        let direction = cosine_direction(frame, f64::from(u), f64::from(v));
-        let mut id = self.ids.nothing();
+    ) -> (u32, [f64; 3]) {
+        let drawn = [u, v].map(f64::from);
+        let mut met = (self.ids.nothing(), [0.0; 3]);
         for attempt in 0..ATTEMPTS {
             let place = site.place(x, y);
             if attempt + 1 < ATTEMPTS && near.is_some_and(|near| self.is_covered(&place, frame, near, salt ^ attempt)) {
@@ -98,8 +109,20 @@ impl<R: Receivers> Caster<'_, R> {
                 (x, y) = (unit(again), unit(hash(again)));
                 continue;
             }
+            let (direction, counts) = match way {
+                Way::Everywhere => (cosine_direction(frame, drawn[0], drawn[1]), None),
+                Way::Out => match self.openings.counted(&place, drawn, OUTWARD) {
+                    Some((direction, counts)) => (direction, Some(counts)),
+                    None => break,
+                },
+            };
             let found = self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), salt);
-            id = self.ids.id(found, direction);
+            let id = self.ids.id(found, direction);
+            let light = self.light(id).map_or([0.0; 3], |light| {
+                let counts = counts.unwrap_or_else(|| self.openings.found(&place, direction, OUTWARD));
+                light.map(|l| counts * l)
+            });
+            met = (id, light);
             if found != Found::Back || !self.receivers.buried(self.tracer, &place, salt) {
                 break;
             }
@@ -107,7 +130,7 @@ impl<R: Receivers> Caster<'_, R> {
             let again = hash(salt ^ attempt);
             (x, y) = (unit(again), unit(hash(again)));
         }
-        id
+        met
     }
 
     /// Whether a ray from a place meets something near, in a direction by chance.
@@ -132,14 +155,14 @@ impl<R: Receivers> Caster<'_, R> {
         let (seed, frame) = (self.receivers.seed(i), frame(site.normal));
         let sequence = Sequence::new(seed, ROWS);
         pilot.place(k, &site, row.len() as u32);
+        self.seek((&site, near), &frame, (hash(seed ^ from), row.len() as u32), k, pilot);
         let half = row.len() / 2;
         for (m, id) in row.iter_mut().enumerate() {
             let index = 2 * from + m as u32;
             let point = sequence.point(index);
-            *id = self.cast((&site, near), &frame, point, hash(hash(seed) ^ index));
-            if let Some(light) = self.light(*id) {
-                pilot.add(k, m / half, [point[0], point[1]], light);
-            }
+            let (met, light) = self.cast((&site, near), (Way::Everywhere, &frame), point, hash(hash(seed) ^ index));
+            *id = met;
+            pilot.add(k, m / half, [point[0], point[1]], light);
         }
     }
 
@@ -149,12 +172,12 @@ impl<R: Receivers> Caster<'_, R> {
         let (seed, frame) = (hash(self.receivers.seed(i) ^ from), frame(site.normal));
         let sequence = Sequence::new(seed, LOOKS);
         pilot.place(k, &site, rays);
+        self.seek((&site, near), &frame, (seed, rays), k, pilot);
         for index in 0..rays {
             let point = sequence.point(index);
-            let id = self.cast((&site, near), &frame, point, hash(hash(seed ^ LOOKS) ^ index));
-            if let Some(light) = self.light(id) {
-                pilot.add(k, usize::from(index >= rays / 2), [point[0], point[1]], light);
-            }
+            let (_, light) =
+                self.cast((&site, near), (Way::Everywhere, &frame), point, hash(hash(seed ^ LOOKS) ^ index));
+            pilot.add(k, usize::from(index >= rays / 2), [point[0], point[1]], light);
         }
     }
 
@@ -163,9 +186,33 @@ impl<R: Receivers> Caster<'_, R> {
         let Some((site, near)) = self.site(i) else { return Default::default() };
         let (seed, frame) = (hash(self.receivers.seed(i) ^ from), frame(site.normal));
         pilot.mean(k, &Sequence::new(seed, AGAIN), |index, point| {
-            let id = self.cast((&site, near), &frame, point, hash(hash(seed ^ AGAIN) ^ index));
-            self.light(id).unwrap_or_default()
+            self.cast((&site, near), (Way::Everywhere, &frame), point, hash(hash(seed ^ AGAIN) ^ index)).1
         })
+    }
+
+    /// Has `pilot` know what receiver k there has of the sky through small openings, by some rays for each of its own.
+    fn seek(
+        &self,
+        from: (&Site, Option<f64>),
+        frame: &[DVec3; 3],
+        (seed, rays): (u32, u32),
+        k: usize,
+        pilot: &mut Pilot,
+    ) {
+        if self.openings.all().is_empty() {
+            return;
+        }
+        let half = (0.5 * OUTWARD * f64::from(rays)).ceil() as u32;
+        let (sequence, salt) = (Sequence::new(seed, OPENINGS), hash(seed ^ OPENINGS));
+        let of_half = |first: u32| {
+            let mut sum = [0f64; 3];
+            for index in first..first + half {
+                let (_, light) = self.cast(from, (Way::Out, frame), sequence.point(index), hash(salt ^ index));
+                (0..3).for_each(|band| sum[band] += light[band]);
+            }
+            sum.map(|sum| sum / f64::from(half))
+        };
+        pilot.know(k, [0, half].map(of_half));
     }
 }
 
@@ -211,6 +258,9 @@ const ROWS: u32 = 0x0100;
 
 /// The stream of those that look for the sky where rows have too few.
 const LOOKS: u32 = 0x0190;
+
+/// That of rays to it through small openings.
+const OPENINGS: u32 = 0x01a0;
 
 /// Rays to the sky over all elements where rows have fewer and it is not seen from everywhere, and the most of each, as many as the longest rows have: a narrow window
 /// lights all of a room. Light on a table behind one a hand wide has a standard deviation of a tenth between solutions of rows of eight rays with half as many, of a
@@ -309,7 +359,7 @@ impl HitTable {
         let done = AtomicUsize::new(0);
         let (mut daylight, mut looked) = (vec![[[0f32; 3]; 2]; n], vec![0; n]);
         let brightest = sky.iter().map(|l| luminance(*l)).fold(0.0, f32::max).into();
-        let caster = Caster { tracer, ids, sky, receivers, from_afar: self.from_afar };
+        let caster = Caster { tracer, ids, sky, openings: tracer.openings(), receivers, from_afar: self.from_afar };
         let looks = (LOOKS_IN_ALL / n.max(1)).min(MOST_LOOKS).next_multiple_of(2) as u32;
         let chunks =
             block.writers(CHUNK).into_par_iter().zip(daylight.par_chunks_mut(CHUNK)).zip(looked.par_chunks_mut(CHUNK));
@@ -604,7 +654,7 @@ impl Transport for HitTable {
 mod tests {
     use super::*;
     use crate::{ElementReceivers, Exposure};
-    use radiosity_scene::{Material, Mesh, Scene, Sky};
+    use radiosity_scene::{AlphaMode, Material, Mesh, Scene, Sky};
 
     /// Hands out the tracer and the elements of a floor, half of it 1 cm beneath a board, under an even sky.
     fn on_a_floor<T>(size: f64, of: impl FnOnce(&Tracer, &IdSpace, &ElementReceivers, &[f64]) -> T) -> T {
@@ -624,20 +674,24 @@ mod tests {
         of(&tracer, &ids, &receivers, &area)
     }
 
-    /// All that comes through a slit of a centimetre into a closed room is known to a seventh by rows of eight rays, few of which meet it: π L
-    /// times its area, and the same at all sizes of elements in the mean.
-    #[test]
-    fn few_rays_tell_what_a_slit_lets_in() {
+    /// Of all that comes into a closed room through a slit of a centimetre, π L times its area, the part that rows of eight rays find, at some sizes of elements; and what
+    /// is checked of each table. The slit is open, or cut out by opacity.
+    fn through_a_slit(is_cut: bool, check: impl Fn(&mut HitTable, &dyn Fn(&mut HitTable, usize))) -> Vec<f64> {
         let mut scene = Scene { sky: Sky::Uniform([1.0; 3]), ..Scene::default() };
-        scene.materials = vec![Material::default()];
+        let cut = Material { base_color: [0.0; 4], alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..Material::default() };
+        scene.materials = vec![Material::default(), cut];
         let [x, y, z] = [DVec3::X * 4.0, DVec3::Y * 4.0, DVec3::Z * 3.0];
         let slit = 0.01;
         let mut quad = |name: &str, at: DVec3, along: DVec3, across: DVec3| {
-            scene.add_quad(name, 0, [at, at + along, at + along + across, at + across]);
+            let material = usize::from(name == "cut");
+            scene.add_quad(name, material, [at, at + along, at + along + across, at + across]);
         };
         quad("floor", DVec3::ZERO, x, y);
         quad("ceiling", z, y, x * 0.5);
         quad("ceiling", z + x * 0.5 + DVec3::X * slit, y, x * 0.5 - DVec3::X * slit);
+        if is_cut {
+            quad("cut", z + x * 0.5, y, DVec3::X * slit);
+        }
         for (at, along, across) in [(DVec3::ZERO, z, x), (y, x, z), (DVec3::ZERO, y, z), (x, z, y)] {
             quad("wall", at, along, across);
         }
@@ -652,20 +706,39 @@ mod tests {
             let receivers = ElementReceivers { mesh: &mesh, elements: &elements, exposure: &exposure };
             let area: Vec<f64> = (0..elements.len() as u32).map(|e| elements.area(&mesh, e)).collect();
             let mut table = HitTable::new(area.clone(), &ids);
-            table.extend(&tracer, (&ids, &ids.sky.radiosity(&scene.sky)), &receivers, 8, &()).unwrap();
+            let more = |table: &mut HitTable, columns: usize| {
+                table.extend(&tracer, (&ids, &ids.sky.radiosity(&scene.sky)), &receivers, columns, &()).unwrap();
+            };
+            more(&mut table, 8);
             let of = |(area, [a, b]): (&f64, &[Bands; 2])| area * f64::from(0.5 * (a[1] + b[1]));
             let found = area.iter().zip(table.daylight()).map(of).sum::<f64>() / exact;
+            check(&mut table, &more);
+            found
+        };
+        sizes.iter().map(of_size).collect()
+    }
+
+    /// Few rays meet a slit that is cut out by opacity. What comes through it is known to a seventh all the same, and as much at all sizes of elements in the mean.
+    #[test]
+    fn few_rays_tell_what_a_slit_lets_in() {
+        let found = through_a_slit(true, |table, more| {
             // Once is enough: further columns look with their own rays.
             let looked = table.looked.clone();
             assert!(looked.iter().all(|rays| *rays >= 50));
-            table.extend(&tracer, (&ids, &ids.sky.radiosity(&scene.sky)), &receivers, 16, &()).unwrap();
+            more(table, 16);
             assert!(table.looked.iter().zip(&looked).all(|(now, before)| (2..=8).contains(&(now - before))));
-            found
-        };
-        let found: Vec<f64> = sizes.iter().map(of_size).collect();
+        });
         let mean = found.iter().sum::<f64>() / found.len() as f64;
         let off = (found.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / found.len() as f64).sqrt();
         assert!(off < 0.15 && (mean - 1.0).abs() < 0.06, "{off} {mean} {found:?}");
+    }
+
+    /// Where rays are sent through it, what a slit lets in is known to some percent at all sizes of elements.
+    #[test]
+    fn what_comes_through_an_opening_is_sought() {
+        let found = through_a_slit(false, |_, _| ());
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        assert!((mean - 1.0).abs() < 0.02 && found.iter().all(|found| (found - 1.0).abs() < 0.05), "{found:?}");
     }
 
     /// Over its area the floor sees half of the sky, and its open half all of it.

@@ -19,7 +19,7 @@ use beams::BeamEnds;
 use glam::{DVec2, DVec3};
 use radiosity_scene::{Bands, Side, Surface, luminance};
 use radiosity_trace::sampling::{Random, Sequence, cosine_direction, frame, shuffled};
-use radiosity_trace::{Emitter, EmitterTree, Found, Place, Tracer};
+use radiosity_trace::{Emitter, EmitterTree, Found, Openings, Place, Tracer};
 use std::f64::consts::PI;
 
 mod beams;
@@ -44,6 +44,7 @@ pub struct Referee<'a> {
     /// Number of each triangle side's emitter plus one; zero for none.
     emitter_of: Vec<[u32; 2]>,
     beams: BeamEnds,
+    openings: &'a Openings,
 }
 
 /// One side of a triangle that emits.
@@ -127,6 +128,7 @@ impl<'a> Referee<'a> {
             from_lamps,
             emitter_of,
             beams: BeamEnds::new(tracer),
+            openings: tracer.openings(),
         }
     }
 
@@ -261,6 +263,7 @@ impl<'a> Referee<'a> {
                 self.sample_lamps(&place, [p, q], edge, random),
                 self.sample_lights(&place, from.as_ref(), random),
                 self.beams.sample(self.tracer, &place, random),
+                self.sample_sky(&place, [p, q], random),
                 lit.map_or([0.0; 3], |lit| self.by_way_of(lit, &place, random)),
             ];
             for band in 0..3 {
@@ -273,9 +276,10 @@ impl<'a> Referee<'a> {
             let (triangle, uv, side, distance) = match self.tracer.first(&ray, random.next_bits()) {
                 Found::Back => break,
                 Found::Escaped => {
-                    let sky = self.tracer.scene.sky.luminance(direction, self.tracer.scene.up.direction());
+                    let sky = self.sky(direction);
+                    let weight = balance(cosine / PI, self.openings.density(&place, direction));
                     for band in 0..3 {
-                        sum[band] += throughput[band] * PI * f64::from(sky[band]);
+                        sum[band] += throughput[band] * weight * PI * f64::from(sky[band]);
                     }
                     break;
                 }
@@ -368,6 +372,22 @@ impl<'a> Referee<'a> {
         sum
     }
 
+    /// Irradiance from a direction through some small opening.
+    fn sample_sky(&self, place: &Place, choice: [f64; 2], random: &mut Random) -> [f64; 3] {
+        let Some((direction, density)) = self.openings.sought(place, choice) else { return [0.0; 3] };
+        if self.tracer.first(&self.tracer.ray(place, direction, f64::INFINITY), random.next_bits()) != Found::Escaped {
+            return [0.0; 3];
+        }
+        let cosine = direction.dot(place.normal);
+        let weight = balance(density, cosine / PI);
+        self.sky(direction).map(|l| weight * f64::from(l) * cosine / density)
+    }
+
+    /// Luminance of the sky, cd/m² per band.
+    fn sky(&self, direction: DVec3) -> Bands {
+        self.tracer.scene.sky.luminance(direction, self.tracer.scene.up.direction())
+    }
+
     /// Irradiance from the lights without area.
     fn sample_lights(&self, place: &Place, from: Option<&Place>, random: &mut Random) -> [f64; 3] {
         let mut sum = [0f64; 3];
@@ -417,7 +437,7 @@ fn balance(own: f64, other: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use radiosity_scene::{Material, Mesh, Scene, Transmission};
+    use radiosity_scene::{Material, Mesh, Scene, Sky, Transmission};
 
     /// A room of 4 × 3 × 2.5 m with a strip of 1.2 m × 4 mm, `gap` below the ceiling, that shines up and down, and maybe a sheet across.
     fn room(gap: f64, sheet: Option<Material>) -> Scene {
@@ -475,6 +495,42 @@ mod tests {
             let off = (mean - plain).abs() / plain_error.hypot(error);
             assert!(off < 3.0, "{plain} ± {plain_error}, {mean} ± {error}");
             assert!(variance > times * less, "{variance}, {less}");
+        }
+    }
+
+    /// Rays through a small opening change what is found of the sky by chance, and nothing else: on the floor, beside the opening, and outside.
+    #[test]
+    fn rays_through_openings_find_the_same_sky() {
+        let grey = Material { base_color: [0.7, 0.7, 0.7, 1.0], double_sided: true, ..Material::default() };
+        let mut scene = Scene { materials: vec![grey], sky: Sky::Uniform([1000.0; 3]), ..Scene::default() };
+        let corner = |k: usize| DVec3::new([0.0, 4.0][k & 1], [0.0, 3.0][k >> 1 & 1], [0.0, 2.5][k >> 2]);
+        for face in [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [0, 2, 6, 4], [1, 5, 7, 3]] {
+            scene.add_quad("room", 0, face.map(corner));
+        }
+        for [low, high] in [[0.0, 1.5], [1.54, 2.5]] {
+            let corners = [[0.0, low], [4.0, low], [4.0, high], [0.0, high]];
+            scene.add_quad("wall", 0, corners.map(|[x, z]| DVec3::new(x, 3.0, z)));
+        }
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        assert!(!tracer.openings().all().is_empty());
+        let none = Openings::default();
+        // With how much more variance at least light is found by chance.
+        let cases = [
+            (DVec3::new(2.0, 1.0, 0.01), DVec3::Z, 20.0),
+            (DVec3::new(2.0, 2.9, 1.4), DVec3::Z, 4.0),
+            (DVec3::new(2.0, 2.0, 1.5), -DVec3::Y, 20.0),
+            (DVec3::new(2.0, 3.2, 1.5), -DVec3::Y, 0.5),
+        ];
+        for (point, normal, times) in cases {
+            let place = Place { point, normal, triangle: u32::MAX };
+            let referee = Referee::new(&tracer);
+            let plain = Referee { openings: &none, ..referee.clone() };
+            let [[by_chance, plain_error, variance], [mean, error, less]] =
+                [seen(&plain, &place, 256), seen(&referee, &place, 64)];
+            let off = (mean - by_chance).abs() / plain_error.hypot(error);
+            assert!(off < 3.0, "{by_chance} ± {plain_error}, {mean} ± {error}");
+            assert!(variance > times * less, "{point}: {variance}, {less}");
         }
     }
 }

@@ -137,6 +137,7 @@ impl<'a> Solution<'a> {
         };
         let begin = |elements: usize| Begin { monitor, is_soon: elements <= FEW };
         stages.time(monitor, "beams", || tracer.beams());
+        stages.time(monitor, "openings", || tracer.openings());
         let elements = stages.time(monitor, "elements", || {
             let cells = Elements::new(scene, mesh, width);
             let cells = if options.looked_up { cells.shared(&width) } else { cells };

@@ -15,10 +15,15 @@ const HIGH: f64 = 10.0;
 const RHO: f32 = 0.5;
 
 /// A hall with an opening [x, end] × [y, top] in its roof, and a card on the floor a metre from the middle that faces it.
-fn hall([x, end]: [f64; 2], [y, top]: [f64; 2], is_grey: bool, light: PointLight) -> Scene {
+pub fn hall(
+    [x, end]: [f64; 2],
+    [y, top]: [f64; 2],
+    is_grey: bool,
+    light: impl IntoIterator<Item = PointLight>,
+) -> Scene {
     let of = |rho: f32| Material { base_color: [rho, rho, rho, 1.0], ..Material::default() };
     let materials = vec![of(RHO), of(if is_grey { RHO } else { 0.0 })];
-    let mut scene = Scene { materials, up: Up::Z, lights: vec![light], ..Scene::default() };
+    let mut scene = Scene { materials, up: Up::Z, lights: light.into_iter().collect(), ..Scene::default() };
     let corner = |k: usize| DVec3::new([0.0, WIDE][k & 1], [0.0, WIDE][k >> 1 & 1], [0.0, HIGH][k >> 2]);
     scene.add_quad("floor", 0, [0, 1, 3, 2].map(corner));
     for face in [[0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]] {
@@ -84,7 +89,7 @@ fn what_comes_through_small_openings_lights_a_hall() {
         ("lamp", middle(0.01), middle(0.01), light(PointLightKind::Point, 1e6), 100.0, 11.0),
     ];
     for (name, x, y, light, flux, times) in cases {
-        let scene = hall(x, y, false, light);
+        let scene = hall(x, y, false, [light]);
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
         let options = MeasureOptions { error: 0.02, ..MeasureOptions::default() };
@@ -101,7 +106,7 @@ fn what_comes_through_small_openings_lights_a_hall() {
 /// Light that goes on from wall to wall, too, as a path tracer has it that finds the spot.
 #[test]
 fn a_grey_hall_is_lit_by_a_spot_again_and_again() {
-    let scene = hall([9.95, 10.05], [9.95, 10.05], true, light(PointLightKind::Directional, 1e6));
+    let scene = hall([9.95, 10.05], [9.95, 10.05], true, [light(PointLightKind::Directional, 1e6)]);
     let mesh = Mesh::new(&scene);
     let tracer = Tracer::new(&scene, &mesh);
     let options = MeasureOptions { error: 0.01, ..MeasureOptions::default() };
@@ -117,7 +122,7 @@ fn a_grey_hall_is_lit_by_a_spot_again_and_again() {
 /// A beam that ends on an opal sheet: what the sheet gives back shines as a light, and what it lets through does not.
 #[test]
 fn a_sheet_lets_the_light_of_a_spot_through_once() {
-    let mut scene = hall([9.85, 10.15], [9.85, 10.15], true, light(PointLightKind::Directional, 1e6));
+    let mut scene = hall([9.85, 10.15], [9.85, 10.15], true, [light(PointLightKind::Directional, 1e6)]);
     let transmission = Transmission { transmittance: [0.4; 3], texture: None, replaced: 0.0, share_texture: None };
     scene.materials.push(Material {
         base_color: [0.4, 0.4, 0.4, 1.0],

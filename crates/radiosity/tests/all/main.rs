@@ -19,6 +19,7 @@ mod lamps;
 mod layers;
 mod live;
 mod narrow;
+mod openings;
 mod paint;
 mod planes;
 mod refusals;

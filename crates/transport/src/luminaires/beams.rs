@@ -8,7 +8,7 @@ use crate::one_light::{geometry, luminance_of};
 use crate::parts::Parts;
 use glam::DVec3;
 use radiosity_scene::{Bands, Elements, Mesh, luminance};
-use radiosity_trace::beams::Cell;
+use radiosity_trace::Cell;
 use radiosity_trace::sampling::hash;
 use radiosity_trace::{Beam, Place, Rectangle, Tracer};
 use rayon::prelude::*;
@@ -146,8 +146,8 @@ fn pieces(tracer: &Tracer, beam: &Beam, most: usize) -> Vec<Piece> {
     let (scene, mesh, triangle) = (tracer.scene, tracer.mesh, beam.triangle as usize);
     let light = &scene.lights[beam.light as usize];
     let given = |cell: &Cell| -> Bands {
-        let at = mesh.surface(triangle, mesh.barycentric(triangle, cell.lit));
-        let (towards, _, arriving) = light.arrival(cell.lit);
+        let at = mesh.surface(triangle, mesh.barycentric(triangle, cell.point));
+        let (towards, _, arriving) = light.arrival(cell.point);
         let falling = scene.opacity(at) * cell.share * towards.dot(beam.normal).max(0.0) as f32;
         let reflectance = scene.reflectance(at);
         std::array::from_fn(|band| falling * reflectance[band] * arriving[band])
@@ -165,7 +165,7 @@ fn pieces(tracer: &Tracer, beam: &Beam, most: usize) -> Vec<Piece> {
             varied: false,
         })
     };
-    beam.rectangles(most).into_iter().flat_map(of_rectangle).collect()
+    beam.end.rectangles(most).into_iter().flat_map(of_rectangle).collect()
 }
 
 /// Which part is lit of the cells that a beam ends on.
@@ -174,7 +174,7 @@ fn share_of_cells(beam: &Beam, mesh: &Mesh, elements: &Elements) -> f64 {
         let uv = mesh.barycentric(beam.triangle as usize, point).as_vec2();
         elements.at(beam.triangle, uv.x, uv.y, beam.side).map(|element| elements.cell(element))
     };
-    let mut cells: Vec<usize> = beam.cells().iter().filter_map(|cell| cell_of(cell.lit)).collect();
+    let mut cells: Vec<usize> = beam.end.cells().iter().filter_map(|cell| cell_of(cell.point)).collect();
     cells.sort_unstable();
     cells.dedup();
     let area = |cell: &usize| {

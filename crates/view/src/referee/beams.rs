@@ -23,13 +23,13 @@ impl BeamEnds {
         let (mut emitters, mut cells, mut first) = (Vec::new(), Vec::new(), Vec::new());
         for (number, beam) in (0..).zip(tracer.beams().all()) {
             first.push(cells.len() as u32);
-            for (k, cell) in (0..).zip(beam.cells()) {
-                let bounds = beam.around(k as usize);
-                let at = mesh.surface(beam.triangle as usize, mesh.barycentric(beam.triangle as usize, cell.lit));
-                let arriving = luminance(scene.lights[beam.light as usize].arrival(cell.lit).2);
+            for (k, cell) in (0..).zip(beam.end.cells()) {
+                let bounds = beam.end.around(k as usize);
+                let at = mesh.surface(beam.triangle as usize, mesh.barycentric(beam.triangle as usize, cell.point));
+                let arriving = luminance(scene.lights[beam.light as usize].arrival(cell.point).2);
                 // Black cells are sampled as well, now and then: what a picture shows elsewhere in them is not known.
                 let share = cell.share.max(0.05) * (luminance(scene.reflectance(at)) + 0.01);
-                let power = beam.area() * f64::from(arriving * share);
+                let power = beam.end.area() * f64::from(arriving * share);
                 emitters.push(Emitter { bounds, normal: beam.normal, power });
                 cells.push((number, k));
             }
@@ -48,7 +48,7 @@ impl BeamEnds {
         };
         let (number, cell) = self.cells[self.tree.order()[leaf] as usize];
         let beam = &beams.all()[number as usize];
-        let point = beam.point(cell as usize, random.next_unit(), random.next_unit());
+        let point = beam.end.point(cell as usize, random.next_unit(), random.next_unit());
         let end = Place { point, normal: beam.normal, triangle: beam.triangle };
         let uv = tracer.mesh.barycentric(beam.triangle as usize, point);
         let light = &tracer.scene.lights[beam.light as usize];
@@ -86,9 +86,9 @@ impl BeamEnds {
         let lit = own.filter(|(_, beam)| beam.light == light && beam.holds(end));
         let of_cell = |(number, cell): (usize, usize)| {
             self.tree.probability(self.first[number] + cell as u32, from.point, from.normal)
-                / beams.all()[number].area()
+                / beams.all()[number].end.area()
         };
-        lit.filter_map(|(number, beam)| Some((number, beam.cell(end.point)?))).map(of_cell).sum()
+        lit.filter_map(|(number, beam)| Some((number, beam.end.cell(end.point)?))).map(of_cell).sum()
     }
 }
 
