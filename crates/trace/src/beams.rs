@@ -8,8 +8,8 @@
 //! What is cut out of a surface by its opacity has no edges, and is not looked for; nor is anything where panes let a part of the light pass by chance, or
 //! where there are millions of triangles.
 
-use crate::edges::Edges;
-use crate::grid::{Grid, Parts};
+use crate::edges::{Edges, MOST_TRIANGLES, PAST, spread, thin};
+use crate::grid::{Extent, Grid};
 use crate::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use crate::{Found, Place, Tracer};
 use glam::DVec3;
@@ -18,17 +18,11 @@ use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Rays past edges for all lights, about, and at most for each edge: an opening may be a small part of a long one.
+/// Rays past edges for all lights, about.
 const PROBES: f64 = (1 << 17) as f64;
-const OF_EDGE: f64 = 64.0;
 
-/// No beams are looked for among more triangles than this, as their edges would take hundreds of megabytes; and past the edges of so many triangles, each
-/// for one light, and a few more. The brightest lights are taken.
-const MOST_TRIANGLES: usize = 1 << 22;
+/// No beams are looked for past the edges of more triangles than so many, each for one light, and a few more. The brightest lights are taken.
 const MOST_LOOKS: usize = 1 << 25;
-
-/// Offsets of ray origins by which such rays pass an edge.
-const PAST: f64 = 16.0;
 
 /// A beam is narrow where of so many places on a disc around it fewer than so many are lit. The disc has this part of the area of all surfaces at most, and a
 /// radius of this part of how far the place sees, or a hall on a wide site would be taken for the site.
@@ -42,8 +36,7 @@ const REACH: f64 = 0.5;
 const SMALL: f64 = 1.0 / 128.0;
 const SIGHTS: u32 = 16;
 
-/// Places from which the ends of beams are grown, at most, and how many of them on one triangle may be too much to be one.
-const SEEDS: usize = 1024;
+/// How many places on one triangle may be too much to be the end of a beam.
 const FAILURES: usize = 16;
 
 /// Rays that look whether any of a cell is lit, and those that tell how much.
@@ -134,7 +127,7 @@ impl Target<'_> {
     }
 }
 
-impl Parts for Target<'_> {
+impl Extent for Target<'_> {
     fn glance(&self, grid: &Grid, at: [i32; 2], _: DVec3) -> Option<DVec3> {
         self.lit_of(grid, at, GLANCES).next()
     }
@@ -178,13 +171,7 @@ impl Beams {
         let probes = PROBES / lights.len() as f64;
         let mut seeds: Vec<Seed> =
             lights.into_iter().flat_map(|light| edges.seeds((tracer, radius), light, probes)).collect();
-        // Too many are thinned evenly.
-        let many = seeds.len().max(SEEDS);
-        let mut number = 0;
-        seeds.retain(|_| {
-            number += 1;
-            number * SEEDS / many > (number - 1) * SEEDS / many
-        });
+        thin(&mut seeds);
         seeds.sort_by_key(|seed| (seed.place.triangle, seed.light));
         let groups: Vec<&[Seed]> =
             seeds.chunk_by(|a, b| (a.place.triangle, a.light) == (b.place.triangle, b.light)).collect();
@@ -264,21 +251,8 @@ impl Edges<'_> {
     /// Where narrow beams end that pass an edge which has nothing of its surfaces on one side, as the light sees it.
     fn seeds(&self, of: (&Tracer, f64), (number, light): (u32, &PointLight), probes: f64) -> Vec<Seed> {
         let outlines: Vec<Outline> = self.all().filter_map(|own| self.outline(own, light)).collect();
-        let whole: f64 = outlines.iter().map(|outline| outline.along.length()).sum();
-        // As many to each edge as its length and its being one tell; where there are too many edges, one now and then.
-        let wanted = |outline: &Outline| {
-            let share = 0.5 * outline.along.length() / whole + 0.5 / outlines.len() as f64;
-            (probes * share).min(OF_EDGE)
-        };
-        let mut reached = 0.5;
-        let counted: Vec<(&Outline, u32)> = outlines
-            .iter()
-            .map(|outline| {
-                let before = f64::floor(reached);
-                reached += wanted(outline);
-                (outline, (reached.floor() - before) as u32)
-            })
-            .collect();
+        let lengths: Vec<f32> = outlines.iter().map(|outline| outline.along.length() as f32).collect();
+        let counted: Vec<(&Outline, u32)> = outlines.iter().zip(spread(&lengths, probes)).collect();
         let seeds = |(index, (outline, count)): (usize, &(&Outline, u32))| {
             let (count, salt) = (*count, hash(index as u32 ^ hash(number)));
             let seed = move |k: u32| outline.seed(of, (number, light), (k, count), hash(salt ^ k));

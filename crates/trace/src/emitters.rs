@@ -166,6 +166,11 @@ impl EmitterTree {
         cone
     }
 
+    /// Memory that it takes beside itself, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.order) + size_of_val(&*self.leaves) + size_of_val(&*self.way)
+    }
+
     /// The emitters in the order of the leaves.
     pub fn order(&self) -> &[u32] {
         &self.order

@@ -46,12 +46,12 @@ pub struct Rectangle {
     pub count: f64,
 }
 
-/// What tells whether a place is within.
-pub(crate) trait Parts {
+/// What tells how far a part of a plane reaches.
+pub(crate) trait Extent {
     /// A place of a cell that is within, if it seems to have one, seen from such a place of the cell beside it.
     fn glance(&self, grid: &Grid, at: [i32; 2], beside: DVec3) -> Option<DVec3>;
 
-    /// How much of a cell is within that has a place that is, more than nothing.
+    /// How much of a cell is within, more than nothing; asked only where a place is.
     fn share(&self, grid: &Grid, at: [i32; 2]) -> f32;
 }
 
@@ -62,7 +62,7 @@ impl Grid {
     }
 
     /// Finds its cells, made wider until they are few; `None` where they would be wider than `coarsest`, or one would be as long as many of these.
-    pub(crate) fn grown(mut self, parts: &impl Parts, coarsest: f64) -> Option<Grid> {
+    pub(crate) fn grown(mut self, extent: &impl Extent, coarsest: f64) -> Option<Grid> {
         let from = self.origin;
         let longest = LONGEST * coarsest;
         while self.widths[0].min(self.widths[1]) <= coarsest && self.widths[0].max(self.widths[1]) <= longest {
@@ -75,7 +75,7 @@ impl Grid {
                 let beside = within[&[i, j]];
                 for at in [[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]] {
                     if !within.contains_key(&at)
-                        && let Some(place) = parts.glance(&self, at, beside)
+                        && let Some(place) = extent.glance(&self, at, beside)
                     {
                         within.insert(at, place);
                         next.push_back(at);
@@ -83,7 +83,7 @@ impl Grid {
                 }
             }
             if within.len() <= CELLS {
-                let cell = |(at, point)| Cell { at, share: parts.share(&self, at), point };
+                let cell = |(at, point)| Cell { at, share: extent.share(&self, at), point };
                 self.cells = within.into_iter().map(cell).collect();
                 self.cells.sort_unstable_by_key(|cell| cell.at);
                 let boxes = (0..self.cells.len()).map(|cell| self.around(cell));

@@ -31,7 +31,7 @@ pub use brute::{blocked_brute, closest_brute, closest_where_brute};
 pub use emitters::{Emitter, EmitterTree};
 pub use grid::{Cell, Grid, Rectangle};
 pub use importance::narrowed;
-pub use openings::{Opening, Openings};
+pub use openings::Openings;
 pub use ray::{Hit, Ray};
 pub use tree::{Flaw, Tree};
 

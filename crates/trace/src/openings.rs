@@ -6,49 +6,48 @@
 //! lie side by side. Whoever sends rays through openings, too, weighs what is found either way (Veach 1997, §9.2): what is taken for an opening changes
 //! what is found by chance, and nothing else.
 
-use crate::edges::Edges;
-use crate::grid::{Grid, Parts, Rectangle};
+use crate::edges::{Edges, MOST_TRIANGLES, PAST, spread, thin};
+use crate::grid::{Extent, Grid, Rectangle};
 use crate::sampling::{Sequence, cosine_direction, frame, hash, unit};
 use crate::{Emitter, EmitterTree, Found, Place, Ray, Tracer};
 use glam::DVec3;
 use radiosity_scene::luminance;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 use std::f64::consts::PI;
 
-/// Rays past edges, about, and at most for each edge: an opening may be a small part of a long one.
+/// Rays past edges, about.
 const PROBES: f64 = (1 << 17) as f64;
-const OF_EDGE: f64 = 64.0;
 
-/// None are looked for among more triangles than this, as their edges would take hundreds of megabytes.
-const MOST_TRIANGLES: usize = 1 << 22;
-
-/// Offsets of ray origins by which places lie beside an edge, and before and behind the plane.
-const PAST: f64 = 16.0;
+/// Triangles beside an edge are parts of one flat surface where the cosine between what they lie on either side is nearer to -1.
+const FLAT: f64 = 0.999_999;
 
 /// Of so many rays from within an opening out at least so many meet the sky, or it lies before the opening.
 const OUTWARD: u32 = 8;
 const FREE: usize = 2;
 
-/// A place sees nearly nothing of the sky where of so many rays fewer than so many meet it.
+/// A place sees nearly nothing of the sky where of so many rays fewer than so many meet it: whoever has more rays there finds the rest by chance.
 const AROUND: u32 = 64;
 const MANY: usize = 4;
 
-/// Part of all surfaces that cells together may have, about, and how many of them lie side by side then.
+/// The coarsest cells are so wide that so many of them are the radius of a disc of this part of all surfaces: of a room of 4 × 5 m a quarter of a wall, or what stands free in
+/// it would have openings around it that are half of the room.
 const LARGEST: f64 = 1.0 / 64.0;
 const COARSEST: f64 = 8.0;
 
-/// Places from which openings are grown, at most, and how many past one edge may be no part of one.
-const SEEDS: usize = 1024;
+/// How many places past one edge may be no part of an opening: where one is not, the others seldom are, and each takes some milliseconds.
 const FAILURES: usize = 1;
 
 /// Places that tell whether any of a cell is open, and how much.
 const GLANCES: u32 = 4;
 const LOOKS: u32 = 16;
 
-/// Rays through an opening from a place inside and from those that this sees, and the part of them at least that meets the sky; the least part of small ones, which have
-/// less than this of all rays by cosine: deep ones light a spot.
+/// Rays through an opening, half of them from a place that sees the sky there, half from those that this place sees; and the part of them at least that gets out.
+/// Less, and most rays would be spent on what stands before it.
 const THROUGH: u32 = 256;
 const WORTH: f64 = 0.125;
+
+/// The part where a small and deep one has less than this of all rays by cosine: it lights a spot, where nothing else would find it.
 const LEAST: f64 = 1.0 / 32.0;
 const SMALL: f64 = 1.0 / 1024.0;
 
@@ -56,13 +55,16 @@ const SMALL: f64 = 1.0 / 1024.0;
 const LINES: u32 = 32;
 const FINE: f64 = 1.0 / 64.0;
 
-/// An opening is one rectangle where at least this part of so many places of it is open.
+/// An opening is one rectangle where at least this part of so many places of it is open, else a few, to waste fewer rays on its corners.
 const EVEN: f64 = 0.9;
 const FILLED: u32 = 256;
 
 /// Rectangles of one opening, and of all, at most.
 const OF_ONE: usize = 4;
 const OF_ALL: usize = 64;
+
+/// The strongest of about so many are taken.
+const MOST_TOLD: usize = 512;
 
 /// The streams of sample points that these use.
 const PAST_EDGE: u32 = 0x0510;
@@ -72,7 +74,7 @@ const INWARD: u32 = 0x0513;
 
 /// A rectangle through which the sky shines in.
 #[derive(Clone, Debug)]
-pub struct Opening {
+struct Opening {
     corner: DVec3,
     sides: [DVec3; 2],
     /// Unit normal, outward.
@@ -85,11 +87,11 @@ pub struct Opening {
 impl Opening {
     /// How far a ray goes that leaves through it; `None` for others.
     fn crossed(&self, from: DVec3, direction: DVec3) -> Option<f64> {
-        let outward = direction.dot(self.normal);
-        let distance = (self.corner - from).dot(self.normal) / outward;
-        if !(outward > 0.0 && distance > 0.0) {
+        let (before, outward) = ((self.corner - from).dot(self.normal), direction.dot(self.normal));
+        if !(before > 0.0 && outward > 0.0) {
             return None;
         }
+        let distance = before / outward;
         let within = from + distance * direction - self.corner;
         let is_within = |side: &DVec3| (0.0..=side.length_squared()).contains(&within.dot(*side));
         self.sides.iter().all(is_within).then_some(distance)
@@ -116,13 +118,7 @@ impl Openings {
             return Openings::default();
         }
         let mut seeds = seeds(tracer);
-        // Too many are thinned evenly.
-        let many = seeds.len().max(SEEDS);
-        let mut number = 0;
-        seeds.retain(|_| {
-            number += 1;
-            number * SEEDS / many > (number - 1) * SEEDS / many
-        });
+        thin(&mut seeds);
         let coarsest = (LARGEST * mesh.whole_area() / PI).sqrt() / COARSEST;
         let groups: Vec<&[Seed]> = seeds.chunk_by(|a, b| a.edge == b.edge).collect();
         let grown = |group: &&[Seed]| {
@@ -148,10 +144,13 @@ impl Openings {
         let mut holes: Vec<Hole> = groups.par_iter().flat_map_iter(grown).collect();
         // One behind the other they are the same light: those are taken through which most of the rays get out, and of about as good ones the largest, as
         // a frame in front of many gaps is all of them.
-        let grade = |hole: &Hole| hole.part.log2().floor();
+        let grade = |hole: &Hole| hole.part.log2().round();
         holes.sort_by(|a, b| grade(b).total_cmp(&grade(a)).then(b.grid.area_within().total_cmp(&a.grid.area_within())));
         let mut list: Vec<Opening> = Vec::new();
         for hole in &holes {
+            if list.len() > MOST_TOLD {
+                break;
+            }
             let is_told = |(from, direction): &&(DVec3, DVec3)| {
                 list.iter().any(|opening| opening.crossed(*from, *direction).is_some())
             };
@@ -159,6 +158,7 @@ impl Openings {
                 list.extend(hole.openings(tracer));
             }
         }
+        list.sort_by(|a, b| b.power.total_cmp(&a.power));
         list.truncate(OF_ALL);
         let emitter = |opening: &Opening| {
             let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| opening.point(x, y));
@@ -174,12 +174,12 @@ impl Openings {
 
     /// Memory that they take, bytes.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.list)
+        size_of_val(&*self.list) + self.tree.bytes()
     }
 
-    /// All of them.
-    pub fn all(&self) -> &[Opening] {
-        &self.list
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
     }
 
     /// What counts of the light that a ray by cosine has from the sky, where `more` directions are sought beside each: the rest is [`Openings::counted`].
@@ -232,40 +232,24 @@ fn seeds(tracer: &Tracer) -> Vec<Seed> {
     let edges = Edges::of(tracer.mesh);
     let vertex = |v: u32| tracer.mesh.vertices[v as usize];
     // Those within a flat surface have nothing open beside them.
-    let sides: Vec<Side> = edges
-        .all()
-        .flat_map_iter(|own| {
-            let [a, b, _] = own[0].map(vertex);
-            let of = move |side: &[u32; 3]| {
-                let aside = (vertex(side[2]) - a).reject_from(b - a);
-                let away = -aside.try_normalize()?;
-                Some(Side { from: a, along: b - a, away })
-            };
-            let found: Vec<Side> = own.iter().filter_map(of).collect();
-            let is_free = |side: &Side| found.iter().all(|other| other.away.dot(side.away) > -0.999_999);
-            found.iter().filter(|side| is_free(side)).copied().collect::<Vec<_>>()
-        })
-        .collect();
-    let whole: f64 = sides.iter().map(|side| side.along.length()).sum();
-    let wanted = |side: &Side| {
-        let share = 0.5 * side.along.length() / whole + 0.5 / sides.len() as f64;
-        (PROBES * share).min(OF_EDGE)
+    let of_edge = |own: &[[u32; 3]]| {
+        let [a, b, _] = own[0].map(vertex);
+        let of = |side: &[u32; 3]| {
+            let aside = (vertex(side[2]) - a).reject_from(b - a);
+            Some(Side { from: a, along: b - a, away: -aside.try_normalize()? })
+        };
+        let found: SmallVec<[Side; 2]> = own.iter().filter_map(of).collect();
+        let is_free = |side: &&Side| found.iter().all(|other| other.away.dot(side.away) > -FLAT);
+        found.iter().filter(is_free).copied().collect::<SmallVec<[Side; 2]>>()
     };
-    let mut reached = 0.5;
-    let counted: Vec<u32> = sides
-        .iter()
-        .map(|side| {
-            let before = f64::floor(reached);
-            reached += wanted(side);
-            (reached.floor() - before) as u32
-        })
-        .collect();
-    let of_side = |(index, (side, count)): (u32, (&Side, &u32))| {
-        let (side, count) = (*side, *count);
-        (0..count).filter_map(move |k| side.seed(tracer, index, (k, count)))
+    let lengths: Vec<f32> = edges.all().flat_map_iter(of_edge).map(|side| side.along.length() as f32).collect();
+    // Of many sides few get a ray.
+    let counted = edges.each().flat_map(of_edge).zip(spread(&lengths, PROBES)).zip(0..);
+    let probed: Vec<((Side, u32), u32)> = counted.filter(|((_, count), _)| *count > 0).collect();
+    let seeds = |((side, count), number): ((Side, u32), u32)| {
+        (0..count).filter_map(move |k| side.seed(tracer, number, (k, count)))
     };
-    let numbered: Vec<(u32, (&Side, &u32))> = (0..).zip(sides.iter().zip(&counted)).collect();
-    numbered.into_par_iter().flat_map_iter(of_side).collect()
+    probed.into_par_iter().flat_map_iter(seeds).collect()
 }
 
 /// An edge of a triangle, and the direction past it in the triangle's plane.
@@ -350,7 +334,7 @@ impl Plane<'_> {
     }
 }
 
-impl Parts for Plane<'_> {
+impl Extent for Plane<'_> {
     fn glance(&self, grid: &Grid, at: [i32; 2], beside: DVec3) -> Option<DVec3> {
         let is_within =
             |point: &DVec3| is_open(self.tracer, *point, self.normal) && is_free(self.tracer, beside, *point);
@@ -411,7 +395,8 @@ impl Hole {
                 let least = (0..LINES).filter_map(of_line).fold(f64::INFINITY, f64::min);
                 if least.is_finite() { (least - FINE * cell[axis]).max(0.0) } else { 0.0 }
             };
-            [closed(false), 1.0 - closed(true)]
+            // Within one cell that is closed in the middle the lines that tell of its sides are others.
+            if cell[axis] <= 0.5 { [closed(false), 1.0 - closed(true)] } else { [0.0, 1.0] }
         });
         let corner = *a + range[0][0] * sides[0] + range[1][0] * sides[1];
         let sides = [0, 1].map(|axis| (range[axis][1] - range[axis][0]) * sides[axis]);
@@ -427,30 +412,30 @@ impl Hole {
         let place = |index: u32| {
             let [u, v] = sequence.pair(index).map(f64::from);
             let ray = tracer.ray(&seed.inside, cosine_direction(&axes, u, v), f64::INFINITY);
-            tracer.place(tracer.first(&ray, index))
+            tracer.place(tracer.first(&ray, hash(index)))
         };
-        let others: Vec<Place> = (0..THROUGH).filter_map(place).collect();
+        let others: Vec<Place> = (0..THROUGH / 2).filter_map(place).collect();
         let cells = grid.cells();
-        let rays = (0..THROUGH).filter_map(|index| {
+        let (mut lines, mut count, mut share) = (Vec::new(), 0, 0.0);
+        for index in 0..THROUGH {
             let other = others.get(index as usize / 2).filter(|_| index % 2 == 1);
             let place = *other.unwrap_or(&seed.inside);
-            let cell = &cells[index as usize * cells.len() / THROUGH as usize];
-            let direction = (cell.point - place.point).try_normalize()?;
-            (direction.dot(normal) > 0.0 && direction.dot(place.normal) > 0.0).then_some((place, direction))
-        });
-        let rays: Vec<(Place, DVec3)> = rays.collect();
-        let gets_out = |(place, direction): &(Place, DVec3)| {
-            tracer.first(&tracer.ray(place, *direction, f64::INFINITY), 0) == Found::Escaped
-        };
-        let lines: Vec<(DVec3, DVec3)> =
-            rays.iter().filter(|ray| gets_out(ray)).map(|(place, direction)| (place.point, *direction)).collect();
-        let count = rays.len().max(1) as f64;
-        let part = lines.len() as f64 / count;
-        let of_cosine = |(place, direction): &(Place, DVec3)| {
-            let distance = (grid.cells()[0].point - place.point).length();
-            direction.dot(place.normal) * direction.dot(normal) * grid.area_within() / (PI * distance * distance)
-        };
-        let share = rays.iter().map(of_cosine).sum::<f64>() / count;
+            let along = cells[index as usize * cells.len() / THROUGH as usize].point - place.point;
+            let distance = along.length();
+            let direction = along / distance;
+            let cosines = direction.dot(normal).max(0.0) * direction.dot(place.normal);
+            if !(distance > 0.0 && cosines > 0.0) {
+                continue;
+            }
+            count += 1;
+            share += cosines * grid.area_within() / (PI * distance * distance);
+            let ray = tracer.ray(&place, direction, f64::INFINITY);
+            if tracer.first(&ray, hash(seed.edge ^ hash(index))) == Found::Escaped {
+                lines.push((place.point, direction));
+            }
+        }
+        let part = lines.len() as f64 / f64::from(count.max(1));
+        let share = share / f64::from(count.max(1));
         (part >= if share < SMALL { LEAST } else { WORTH }).then_some(Hole { grid, normal, lines, part })
     }
 }
@@ -459,7 +444,7 @@ impl Hole {
 mod tests {
     use super::*;
     use crate::sampling::Random;
-    use radiosity_scene::{Material, Mesh, Scene, Sky};
+    use radiosity_scene::{AlphaMode, Material, Mesh, Scene, Sky};
 
     /// The parts of a rectangle around a hole in it, by two opposite corners of either in the plane at a height.
     fn around(scene: &mut Scene, [low, high]: [[f64; 2]; 2], [from, to]: [[f64; 2]; 2], z: f64, is_up: bool) {
@@ -501,7 +486,7 @@ mod tests {
 
     fn openings(scene: &Scene) -> Vec<f64> {
         let mesh = Mesh::new(scene);
-        Tracer::new(scene, &mesh).openings().all().iter().map(|opening| opening.area).collect()
+        Tracer::new(scene, &mesh).openings().list.iter().map(|opening| opening.area).collect()
     }
 
     /// Each is found once and as large as it is, however small, long and deep, though four edges lead there.
@@ -521,6 +506,46 @@ mod tests {
             let is_right = matches!(found[..], [found] if (0.98..1.05).contains(&(found / area)));
             assert!(is_right, "{hole:?}, {thick}: {found:?} of {area} m²");
         }
+    }
+
+    /// A window behind a pane that lets two thirds of the light pass is one, and is told to let so much out.
+    #[test]
+    fn panes_are_no_walls() {
+        let mut scene = hall([[9.0, 9.0], [10.0, 10.5]], 0.3);
+        let base_color = [1.0, 1.0, 1.0, 1.0 / 3.0];
+        scene.materials.push(Material {
+            base_color,
+            alpha_mode: AlphaMode::Blend,
+            double_sided: true,
+            ..Material::default()
+        });
+        let pane = [[9.0, 9.0], [10.0, 9.0], [10.0, 10.5], [9.0, 10.5]].map(|[x, y]| DVec3::new(x, y, 10.1));
+        scene.add_quad("pane", 1, pane);
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let list = &tracer.openings().list;
+        let (area, power) = list.iter().fold((0.0, 0.0), |(area, power), one| (area + one.area, power + one.power));
+        assert!((1.45..1.6).contains(&area), "{list:?}");
+        // The edges of the roof hide some of it from the walls.
+        assert!((0.4..0.7).contains(&(power / area)), "{list:?}");
+    }
+
+    /// Two holes that lie across the one cell of a rectangle leave it as it is.
+    #[test]
+    fn what_is_closed_across_is_not_trimmed_away() {
+        let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
+        // Open before 1 m and after 1.5 m.
+        for [x, y, end, top] in [[1.0, -1.0, 3.0, 1.0], [-1.0, 1.0, 1.5, 3.0]] {
+            let corners = [[x, y], [end, y], [end, top], [x, top]].map(|[x, y]| DVec3::new(x, y, 0.0));
+            scene.add_quad("part", 0, corners);
+        }
+        let mesh = Mesh::new(&scene);
+        let tracer = Tracer::new(&scene, &mesh);
+        let grid = Grid::new(DVec3::ZERO, [DVec3::X, DVec3::Y], 9.0);
+        let hole = Hole { grid, normal: DVec3::Z, lines: Vec::new(), part: 1.0 };
+        let corners = [[0.0, 0.0], [2.5, 0.0], [2.5, 2.0], [0.0, 2.0]].map(|[x, y]| DVec3::new(x, y, 0.0));
+        let rectangle = Rectangle { corners, cells: Vec::new(), count: 1.0 };
+        assert_eq!(hole.trimmed(&tracer, &rectangle).area, 5.0);
     }
 
     /// None are where the sky is seen from all over the room, where there is no sky, and around what stands on a lawn.
@@ -545,7 +570,7 @@ mod tests {
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
         let openings = tracer.openings();
-        assert!(!openings.all().is_empty());
+        assert!(!openings.is_empty());
         let place = Place { point: DVec3::new(8.0, 9.0, 8.0), normal: DVec3::new(0.6, 0.0, 0.8), triangle: u32::MAX };
         let (mut random, count) = (Random::new(1), 200_000);
         let axes = frame(place.normal);

@@ -13,7 +13,7 @@
 //! that the numbers are the same to the bit.
 
 use crate::block::{Block, Buffer, FileError, Lent, portion};
-use crate::gather::OUTWARD;
+use crate::gather::SKYWARD;
 use crate::pilot::{AGAIN, Pilot};
 use crate::receivers::Site;
 use crate::{Progress, Receivers, Stopped};
@@ -111,15 +111,16 @@ impl<R: Receivers> Caster<'_, R> {
             }
             let (direction, counts) = match way {
                 Way::Everywhere => (cosine_direction(frame, drawn[0], drawn[1]), None),
-                Way::Out => match self.openings.counted(&place, drawn, OUTWARD) {
+                Way::Out => match self.openings.counted(&place, drawn, SKYWARD) {
                     Some((direction, counts)) => (direction, Some(counts)),
+                    // No opening is before the plane of the receiver: other places have none, either.
                     None => break,
                 },
             };
             let found = self.tracer.first(&self.tracer.ray(&place, direction, f64::INFINITY), salt);
             let id = self.ids.id(found, direction);
             let light = self.light(id).map_or([0.0; 3], |light| {
-                let counts = counts.unwrap_or_else(|| self.openings.found(&place, direction, OUTWARD));
+                let counts = counts.unwrap_or_else(|| self.openings.found(&place, direction, SKYWARD));
                 light.map(|l| counts * l)
             });
             met = (id, light);
@@ -172,7 +173,7 @@ impl<R: Receivers> Caster<'_, R> {
         let (seed, frame) = (hash(self.receivers.seed(i) ^ from), frame(site.normal));
         let sequence = Sequence::new(seed, LOOKS);
         pilot.place(k, &site, rays);
-        self.seek((&site, near), &frame, (seed, rays), k, pilot);
+        self.seek((&site, near), &frame, (hash(seed ^ LOOKS), rays), k, pilot);
         for index in 0..rays {
             let point = sequence.point(index);
             let (_, light) =
@@ -199,10 +200,10 @@ impl<R: Receivers> Caster<'_, R> {
         k: usize,
         pilot: &mut Pilot,
     ) {
-        if self.openings.all().is_empty() {
+        if self.openings.is_empty() {
             return;
         }
-        let half = (0.5 * OUTWARD * f64::from(rays)).ceil() as u32;
+        let half = (0.5 * SKYWARD * f64::from(rays)).ceil() as u32;
         let (sequence, salt) = (Sequence::new(seed, OPENINGS), hash(seed ^ OPENINGS));
         let of_half = |first: u32| {
             let mut sum = [0f64; 3];
@@ -359,7 +360,9 @@ impl HitTable {
         let done = AtomicUsize::new(0);
         let (mut daylight, mut looked) = (vec![[[0f32; 3]; 2]; n], vec![0; n]);
         let brightest = sky.iter().map(|l| luminance(*l)).fold(0.0, f32::max).into();
-        let caster = Caster { tracer, ids, sky, openings: tracer.openings(), receivers, from_afar: self.from_afar };
+        let none = Openings::default();
+        let openings = if sky.is_empty() { &none } else { tracer.openings() };
+        let caster = Caster { tracer, ids, sky, openings, receivers, from_afar: self.from_afar };
         let looks = (LOOKS_IN_ALL / n.max(1)).min(MOST_LOOKS).next_multiple_of(2) as u32;
         let chunks =
             block.writers(CHUNK).into_par_iter().zip(daylight.par_chunks_mut(CHUNK)).zip(looked.par_chunks_mut(CHUNK));

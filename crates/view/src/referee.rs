@@ -1,4 +1,4 @@
-//! The referee: an unbiased path tracer of irradiance, sharing nothing with the engine but rays and where narrow beams end (catalogue 3, 70).
+//! The referee: an unbiased path tracer of irradiance, sharing nothing with the engine but rays, where narrow beams end, and where openings are (catalogue 3, 70).
 //!
 //! E(x) = Σ over light samples + Σ over one cosine-distributed ray that carries on from what it meets; emitters are
 //! found both ways and weighted by the balance heuristic (Veach 1997, §9.2); paths end by roulette, and where they meet a
@@ -14,6 +14,8 @@
 //!
 //! Where lamps without area light something through a small opening, the end of the beam is itself a lamp to all that sees it: it is sampled by
 //! area and weighted against the paths that meet it by chance (`beams.rs`). Of beams that were not found neither the engine nor this knows but by chance.
+//!
+//! Where the sky shines in through small openings, one more ray from each place of a path goes through one of them, weighted against those that get out by chance.
 
 use beams::BeamEnds;
 use glam::{DVec2, DVec3};
@@ -513,7 +515,7 @@ mod tests {
         }
         let mesh = Mesh::new(&scene);
         let tracer = Tracer::new(&scene, &mesh);
-        assert!(!tracer.openings().all().is_empty());
+        assert!(!tracer.openings().is_empty());
         let none = Openings::default();
         // With how much more variance at least light is found by chance.
         let cases = [
