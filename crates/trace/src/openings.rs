@@ -160,6 +160,10 @@ impl Openings {
         }
         list.sort_by(|a, b| b.power.total_cmp(&a.power));
         list.truncate(OF_ALL);
+        Openings::of(list)
+    }
+
+    fn of(list: Vec<Opening>) -> Openings {
         let emitter = |opening: &Opening| {
             let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| opening.point(x, y));
             let bounds = [
@@ -199,6 +203,8 @@ impl Openings {
         let (leaf, _) = self.tree.pick(0, place.point, place.normal, &mut u)?;
         let opening = &self.list[self.tree.order()[leaf] as usize];
         let direction = (opening.point(u, v) - place.point).try_normalize()?;
+        // Who is in front of it may see another one behind it, by ways that are not told as dense as they would be.
+        opening.crossed(place.point, direction)?;
         let density = self.density(place, direction);
         (density > 0.0 && direction.dot(place.normal) > 0.0).then_some((direction, density))
     }
@@ -506,6 +512,30 @@ mod tests {
             let is_right = matches!(found[..], [found] if (0.98..1.05).contains(&(found / area)));
             assert!(is_right, "{hole:?}, {thick}: {found:?} of {area} m²");
         }
+    }
+
+    /// Who looks through one opening from in front of it and out of another one behind it, around a corner, has the ways through the second as dense as told.
+    #[test]
+    fn openings_around_a_corner_do_not_add_to_each_other() {
+        let opening = |corner: DVec3, sides: [DVec3; 2], normal: DVec3| {
+            let area = sides[0].cross(sides[1]).length();
+            Opening { corner, sides, normal, area, power: area }
+        };
+        let front = opening(DVec3::ZERO, [DVec3::X, DVec3::Z], -DVec3::Y);
+        let side = opening(DVec3::X, [DVec3::Y, DVec3::Z], DVec3::X);
+        let openings = Openings::of(vec![front, side.clone()]);
+        let place = Place { point: DVec3::new(0.2, -0.3, 0.1), normal: DVec3::Y, triangle: u32::MAX };
+        let (mut random, axes, count) = (Random::new(3), frame(place.normal), 100_000);
+        let [mut by_chance, mut sought] = [0.0; 2];
+        for _ in 0..count {
+            let direction = cosine_direction(&axes, random.next_unit(), random.next_unit());
+            by_chance += f64::from(u8::from(side.crossed(place.point, direction).is_some()));
+            if let Some((direction, density)) = openings.sought(&place, [random.next_unit(), random.next_unit()]) {
+                sought += direction.dot(place.normal) / (PI * density);
+            }
+        }
+        // A tenth of the rays.
+        assert!((sought / by_chance - 1.0).abs() < 0.03, "{sought} {by_chance}");
     }
 
     /// A window behind a pane that lets two thirds of the light pass is one, and is told to let so much out.
