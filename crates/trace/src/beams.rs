@@ -166,7 +166,7 @@ impl Beams {
         }
         lights.sort_by(|(_, a), (_, b)| power(b).total_cmp(&power(a)));
         lights.truncate(MOST_LOOKS / triangles.max(1) + 1);
-        let edges = Edges::of(tracer.mesh);
+        let edges = Edges::of(tracer.mesh, |_| true);
         let radius = (DISC * tracer.mesh.whole_area() / PI).sqrt();
         let probes = PROBES / lights.len() as f64;
         let mut seeds: Vec<Seed> =

@@ -23,11 +23,18 @@ pub(crate) struct Edges<'a> {
 }
 
 impl Edges<'_> {
-    /// Those of a mesh.
-    pub fn of(mesh: &Mesh) -> Edges<'_> {
+    /// Those of some triangles of a mesh, by their numbers.
+    pub fn of(mesh: &Mesh, is_part: impl Fn(usize) -> bool + Sync) -> Edges<'_> {
         let of_triangle =
             |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, c]| [a.min(b), a.max(b), c]);
-        let mut sides: Vec<[u32; 3]> = mesh.triangles.par_iter().flat_map_iter(of_triangle).collect();
+        let mut sides: Vec<[u32; 3]> = mesh
+            .triangles
+            .par_iter()
+            .enumerate()
+            .filter(|(t, _)| is_part(*t))
+            .map(|(_, corners)| corners)
+            .flat_map_iter(of_triangle)
+            .collect();
         sides.par_sort_unstable();
         Edges { mesh, sides }
     }
@@ -36,6 +43,7 @@ impl Edges<'_> {
     pub fn all(&self) -> impl ParallelIterator<Item = &[[u32; 3]]> {
         self.sides.par_chunk_by(|a, b| a[..2] == b[..2])
     }
+
     /// The same one after the other.
     pub fn each(&self) -> impl Iterator<Item = &[[u32; 3]]> {
         self.sides.chunk_by(|a, b| a[..2] == b[..2])

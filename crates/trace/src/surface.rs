@@ -269,6 +269,11 @@ impl<'a> Tracer<'a> {
             + self.openings.get().map_or(0, Openings::bytes)
     }
 
+    /// Whether a triangle is cut out or lets light pass somewhere.
+    pub(crate) fn is_see_through(&self, triangle: usize) -> bool {
+        self.kind[triangle].see_through
+    }
+
     /// Whether anything lets a part of the light pass, by chance for each ray.
     pub(crate) fn has_panes(&self) -> bool {
         let is_pane = |t: usize| {
